@@ -1,0 +1,271 @@
+"""What flows between the rooms: telemetry samples, estimates, references, setpoints, requests and status.
+
+World frame ENU, body frame FLU, SI units, radians. Quaternions are Hamilton, w first, body to world.
+Every sample carries the time at which it was true, in seconds of the host's monotonic clock
+(the link maps vehicle time to it), never the time of its arrival.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class FlightMode(enum.Enum):
+    """Flight modes that uasfly tells apart; everything else is OTHER."""
+
+    HOLD = "hold"
+    TAKEOFF = "takeoff"
+    OFFBOARD = "offboard"
+    LAND = "land"
+    RETURN = "return"
+    POSITION = "position"
+    DESCEND = "descend"
+    OTHER = "other"
+
+
+@dataclass(frozen=True, slots=True)
+class OdometrySample:
+    """PX4's own estimate of its motion (ODOMETRY); the position is GNSS-like: it may carry a slow bias.
+
+    Attributes:
+        time_s: when it was true.
+        position_in_world: (3,) m, ENU from PX4's local origin.
+        velocity_in_world: (3,) m/s.
+        quaternion_body_to_world: (4,) unit quaternion.
+        angular_rate_in_body: (3,) rad/s.
+        reset_counter: grows by one when PX4's estimator jumps.
+    """
+
+    time_s: float
+    position_in_world: Array
+    velocity_in_world: Array
+    quaternion_body_to_world: Array
+    angular_rate_in_body: Array
+    reset_counter: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerSample:
+    """Pose of a marker (or bundle) relative to the body, from a camera frame exposed at `time_s`.
+
+    Attributes:
+        marker_id: which marker or bundle.
+        position_in_body: (3,) m, marker origin seen from the body origin.
+        quaternion_marker_to_body: (4,).
+        covariance: (6, 6) of position [m^2] and small-angle rotation [rad^2].
+    """
+
+    time_s: float
+    marker_id: int
+    position_in_body: Array
+    quaternion_marker_to_body: Array
+    covariance: Array
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeTargetSample:
+    """What PX4's attitude controller is being asked for (ATTITUDE_TARGET), by whichever mode flies; thrust 0..1."""
+
+    time_s: float
+    quaternion_body_to_world: Array
+    thrust: float
+
+
+@dataclass(frozen=True, slots=True)
+class BatterySample:
+    """Battery as PX4 reports it; `remaining` is 0..1, NaN where unknown."""
+
+    time_s: float
+    voltage_v: float
+    remaining: float
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleSample:
+    """Mode, arming and landed state; `time_s` is the last heartbeat's."""
+
+    time_s: float
+    mode: FlightMode
+    armed: bool
+    in_air: bool
+
+
+@dataclass(frozen=True, slots=True)
+class HealthSample:
+    """What PX4 says about its estimator and GNSS (ESTIMATOR_STATUS flags, GPS_RAW_INT)."""
+
+    time_s: float
+    position_ok: bool
+    velocity_ok: bool
+    attitude_ok: bool
+    gnss_fix: int
+    gnss_satellites: int
+    horizontal_accuracy_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class TextSample:
+    """A status text from the vehicle; severity as in MAVLink (0 emergency .. 7 debug)."""
+
+    time_s: float
+    severity: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class TruthSample:
+    """True state where a simulation gives it; only the summary and the log look at it.
+
+    Attributes:
+        position_in_world: (3,) m. velocity_in_world: (3,) m/s. quaternion_body_to_world: (4,).
+        force_in_world: (3,) m/s^2, mass-normalised force of the wind on the vehicle beyond the still-air drag of its motion.
+        wind_in_world: (3,) m/s at the vehicle.
+    """
+
+    time_s: float
+    position_in_world: Array
+    velocity_in_world: Array
+    quaternion_body_to_world: Array
+    force_in_world: Array
+    wind_in_world: Array
+
+
+class RequestKind(enum.Enum):
+    """What the step can ask of the vehicle besides setpoints."""
+
+    ARM = "arm"
+    DISARM = "disarm"
+    TAKEOFF = "takeoff"
+    OFFBOARD = "offboard"
+    HOLD = "hold"
+    LAND = "land"
+    RETURN = "return"
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One command to the vehicle; `height_m` belongs to TAKEOFF (above the ground)."""
+
+    kind: RequestKind
+    height_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class RequestResult:
+    """The vehicle's answer to a request; `text` says why it refused."""
+
+    time_s: float
+    request: Request
+    accepted: bool
+    text: str = ""
+
+
+Sample = (
+    OdometrySample
+    | MarkerSample
+    | AttitudeTargetSample
+    | BatterySample
+    | VehicleSample
+    | HealthSample
+    | TextSample
+    | TruthSample
+    | RequestResult
+)
+
+
+@dataclass(frozen=True, slots=True)
+class StateEstimate:
+    """What the observer knows at `time_s`.
+
+    Attributes:
+        position_in_world: (3,) m. velocity_in_world: (3,) m/s. quaternion_body_to_world: (4,).
+        angular_rate_in_body: (3,) rad/s, last measured.
+        force_in_world: (3,) m/s^2, mass-normalised wind force.
+        gnss_bias_in_world: (3,) m, measured minus true position.
+        position_sigma_m, velocity_sigma_m_s, force_sigma_m_s2: (3,) standard deviations.
+    """
+
+    time_s: float
+    position_in_world: Array
+    velocity_in_world: Array
+    quaternion_body_to_world: Array
+    angular_rate_in_body: Array
+    force_in_world: Array
+    gnss_bias_in_world: Array
+    position_sigma_m: Array
+    velocity_sigma_m_s: Array
+    force_sigma_m_s2: Array
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceHorizon:
+    """A reference sampled at n times; row 0 is now. Derivatives are consistent with the positions.
+
+    Attributes:
+        time_s: (n,). position_in_world: (n, 3) m. velocity_in_world: (n, 3) m/s.
+        acceleration_in_world: (n, 3) m/s^2. yaw_rad: (n,) unwrapped. yaw_rate_rad_s: (n,).
+    """
+
+    time_s: Array
+    position_in_world: Array
+    velocity_in_world: Array
+    acceleration_in_world: Array
+    yaw_rad: Array
+    yaw_rate_rad_s: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoint:
+    """Attitude and thrust for PX4: ENU/FLU angles (Z-Y-X), yaw rate as feed-forward, thrust 0..1."""
+
+    time_s: float
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+    yaw_rate_rad_s: float
+    thrust: float
+
+
+class Phase(enum.Enum):
+    """Where a flight is."""
+
+    CONNECT = "connect"
+    PREFLIGHT = "preflight"
+    TAKEOFF = "takeoff"
+    ENGAGE = "engage"
+    LEGS = "legs"
+    ENDING = "ending"
+    DONE = "done"
+    ABORTED = "aborted"
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What a step has to say, for the live view, the log and the summary.
+
+    Attributes:
+        time_s: the step's time. phase: where the flight is. leg: index of the current leg, -1 outside.
+        leg_started: the first leg has begun and the last has not ended: tracking counts.
+        progress: 0..1 of the legs' duration. estimate: None until the observer has started.
+        reference_position_in_world: (3,) or None outside the legs.
+        reason: why the flight ended early, "" otherwise.
+        fallback: name of what replaced the solver's answer in this step, "" when nothing did.
+        announcements: new texts for the pilot, with their severity as in MAVLink.
+    """
+
+    time_s: float
+    phase: Phase
+    leg: int
+    leg_started: bool
+    progress: float
+    estimate: StateEstimate | None
+    reference_position_in_world: Array | None
+    fallback: str = ""
+    reason: str = ""
+    announcements: tuple[tuple[int, str], ...] = field(default=())

@@ -1,0 +1,139 @@
+"""The flight log: an MCAP file with one JSON channel a message type, complete up to the last second whatever happens.
+
+Every half second of log time the chunk in progress is closed and handed to the operating system, so a killed process
+loses at most that. A full disk or a vanished folder stops the log, never the flight: `problem` then says why.
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import threading
+from pathlib import Path
+from typing import IO, Any
+
+from mcap.writer import CompressionType, IndexType, Writer
+
+from uasfly import __version__
+from uasfly.errors import FileError
+from uasfly.record.encode import json_schema, to_json
+
+FLUSH_INTERVAL_S = 0.5
+PROFILE = "uasfly"
+
+
+def topic_of(message_type: type[Any]) -> str:
+    """Topic under which messages of a type are logged: `/odometry` for OdometrySample."""
+    name = message_type.__name__.removesuffix("Sample")
+    return "/" + "".join(f"_{c.lower()}" if c.isupper() else c for c in name).lstrip("_")
+
+
+class LogWriter:
+    """Writes messages to an MCAP file in the calling thread; the same calls give the same bytes."""
+
+    def __init__(self, path: Path, description: dict[str, object]) -> None:
+        """Open the file and write what was flown.
+
+        Args:
+            path: the file; its folder must exist.
+            description: plain data (airframe, mission, scenario, seed, ...), stored as MCAP metadata.
+
+        Raises:
+            FileError: when the file cannot be opened.
+        """
+        try:
+            self._stream: IO[bytes] = path.open("wb")
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise FileError(
+                str(path), [f"the flight log cannot be written: {reason}; choose another file with --log"]
+            ) from error
+        self.path = path
+        self.problem = ""
+        self._channels: dict[type[Any], int] = {}
+        self._last_flush_s = -1e9
+        self._writer: Any = Writer(
+            self._stream,
+            chunk_size=1 << 20,
+            compression=CompressionType.ZSTD,
+            index_types=IndexType.ALL,
+        )
+        self._writer.start(profile=PROFILE, library=f"uasfly {__version__}")
+        self._writer.add_metadata("flight", {key: json.dumps(value) for key, value in description.items()})
+
+    def write(self, message: Any, log_time_s: float) -> None:
+        """Append one message; `log_time_s` is the step in which uasfly saw it (host time)."""
+        if self.problem:
+            return
+        try:
+            channel = self._channels.get(type(message))
+            if channel is None:
+                channel = self._register(type(message))
+            nanoseconds = round(log_time_s * 1e9)
+            self._writer.add_message(channel, nanoseconds, to_json(message), nanoseconds)
+            if log_time_s - self._last_flush_s >= FLUSH_INTERVAL_S:
+                self._writer.flush()
+                self._last_flush_s = log_time_s
+        except OSError as error:
+            self._give_up(error)
+
+    def close(self) -> None:
+        """Write the index and close; safe to call twice."""
+        if self._stream.closed:
+            return
+        try:
+            if not self.problem:
+                self._writer.finish()
+        except OSError as error:
+            self._give_up(error)
+        finally:
+            try:
+                self._stream.close()
+            except OSError as error:
+                self._give_up(error)
+
+    def _register(self, message_type: type[Any]) -> int:
+        schema = json.dumps(json_schema(message_type)).encode()
+        schema_id = self._writer.register_schema(message_type.__name__, "jsonschema", schema)
+        channel: int = self._writer.register_channel(topic_of(message_type), "json", schema_id)
+        self._channels[message_type] = channel
+        return channel
+
+    def _give_up(self, error: OSError) -> None:
+        self.problem = f"the flight log {self.path} stopped: {error.strerror or error}"
+
+
+class BackgroundLogWriter:
+    """The same log, written by a thread of its own, so that a slow card never delays a control cycle."""
+
+    def __init__(self, path: Path, description: dict[str, object]) -> None:
+        """Open the file (see `LogWriter`) and start the thread."""
+        self._writer = LogWriter(path, description)
+        self._queue: queue.SimpleQueue[tuple[Any, float] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name="flight log", daemon=True)
+        self._thread.start()
+
+    @property
+    def path(self) -> Path:
+        """The file that is written."""
+        return self._writer.path
+
+    @property
+    def problem(self) -> str:
+        """Why the log stopped, "" while it runs."""
+        return self._writer.problem
+
+    def write(self, message: Any, log_time_s: float) -> None:
+        """Hand one message over; returns at once."""
+        self._queue.put((message, log_time_s))
+
+    def close(self) -> None:
+        """Write what is left and close the file; safe to call twice."""
+        if self._thread.is_alive():
+            self._queue.put(None)
+            self._thread.join()
+
+    def _run(self) -> None:
+        while (item := self._queue.get()) is not None:
+            self._writer.write(*item)
+        self._writer.close()
