@@ -61,7 +61,7 @@ def rotation_vector_from_quaternion(quaternion: Array) -> Array:
 
 
 def rotation_matrix(quaternion: Array) -> Array:
-    """Rotation matrix (3, 3) of a unit quaternion (4,): maps body vectors to the world for `quaternion_body_to_world`."""
+    """Rotation matrix (3, 3) of a unit quaternion (4,): takes what the quaternion takes, body vectors to the world."""
     w, x, y, z = quaternion.tolist()
     return np.array(
         (

@@ -124,7 +124,7 @@ class TruthSample:
 
     Attributes:
         position_in_world: (3,) m. velocity_in_world: (3,) m/s. quaternion_body_to_world: (4,).
-        force_in_world: (3,) m/s^2, mass-normalised force of the wind on the vehicle beyond the still-air drag of its motion.
+        force_in_world: (3,) m/s^2, mass-normalised force of the wind beyond the still-air drag of its motion.
         wind_in_world: (3,) m/s at the vehicle.
     """
 

@@ -1,0 +1,270 @@
+"""The phases of a flight, played through with a scripted vehicle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from uasfly.flight.sequencer import EndingAction, Engage, Sequencer
+from uasfly.flight.view import VehicleView
+from uasfly.messages import (
+    FlightMode,
+    OdometrySample,
+    Phase,
+    Request,
+    RequestKind,
+    RequestResult,
+    Sample,
+    StateEstimate,
+    VehicleSample,
+)
+
+PERIOD_S = 0.02
+ZERO = np.zeros(3)
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def _estimate(time_s: float, sigma_m: float = 0.01) -> StateEstimate:
+    sigma = np.full(3, sigma_m)
+    return StateEstimate(time_s, ZERO, ZERO, LEVEL, ZERO, ZERO, ZERO, sigma, sigma, sigma)
+
+
+@dataclass
+class Script:
+    """A vehicle that does what it is asked, unless told otherwise, and a flight around it."""
+
+    sequencer: Sequencer
+    view: VehicleView = field(default_factory=VehicleView)
+    time_s: float = 0.0
+    mode: FlightMode = FlightMode.HOLD
+    armed: bool = False
+    in_air: bool = False
+    silent: bool = False
+    refuse: set[RequestKind] = field(default_factory=set)
+    mute: set[RequestKind] = field(default_factory=set)
+    legs_done: bool = False
+    sigma_m: float = 0.01
+    asked: list[RequestKind] = field(default_factory=list)
+    texts: list[str] = field(default_factory=list)
+    _queue: list[Sample] = field(default_factory=list)
+    _airborne_at_s: float | None = None
+
+    def run(self, seconds: float) -> None:
+        """Let cycles pass."""
+        for _ in range(round(seconds / PERIOD_S)):
+            self.time_s += PERIOD_S
+            samples, self._queue = self._queue, []
+            if self._airborne_at_s is not None and self.time_s >= self._airborne_at_s:
+                self.in_air, self.mode, self._airborne_at_s = True, FlightMode.HOLD, None
+            if not self.silent:
+                samples.append(OdometrySample(self.time_s, ZERO, ZERO, LEVEL, ZERO))
+                samples.append(VehicleSample(self.time_s, self.mode, self.armed, self.in_air))
+            self.view.update(tuple(samples))
+            requests = self.sequencer.step(self.time_s, self.view, _estimate(self.time_s, self.sigma_m), self.legs_done)
+            self.texts += [text for _, text in self.sequencer.announcements]
+            self.sequencer.announcements.clear()
+            for request in requests:
+                self._answer(request)
+
+    def _answer(self, request: Request) -> None:
+        self.asked.append(request.kind)
+        if request.kind in self.mute:
+            return
+        accepted = request.kind not in self.refuse
+        self._queue.append(RequestResult(self.time_s, request, accepted, "" if accepted else "not now"))
+        if not accepted:
+            return
+        match request.kind:
+            case RequestKind.ARM:
+                self.armed = True
+            case RequestKind.TAKEOFF:
+                self.mode, self._airborne_at_s = FlightMode.TAKEOFF, self.time_s + 3.0
+            case RequestKind.OFFBOARD:
+                self.mode = FlightMode.OFFBOARD
+            case RequestKind.HOLD:
+                self.mode = FlightMode.HOLD
+            case RequestKind.LAND | RequestKind.RETURN:
+                self.mode, self.armed, self.in_air = FlightMode.LAND, False, False
+            case _:
+                pass
+
+
+def _script(engage: Engage = Engage.AUTO, ending: EndingAction = EndingAction.LAND) -> Script:
+    return Script(Sequencer(engage, 1.5, ending))
+
+
+def _in_legs(ending: EndingAction = EndingAction.LAND) -> Script:
+    script = _script(ending=ending)
+    script.run(12.0)
+    assert script.sequencer.phase is Phase.LEGS
+    return script
+
+
+def test_an_undisturbed_flight_goes_through_every_phase() -> None:
+    """Arm, take off, offboard, land, each asked once, and the flight is done."""
+    script = _in_legs()
+    script.legs_done = True
+    script.run(3.0)
+    assert script.sequencer.phase is Phase.DONE
+    assert script.sequencer.reason == ""
+    assert script.asked == [RequestKind.ARM, RequestKind.TAKEOFF, RequestKind.OFFBOARD, RequestKind.LAND]
+
+
+def test_nothing_is_streamed_before_engaging_and_after_landing() -> None:
+    """Setpoints flow in engage and legs only."""
+    script = _script()
+    streamed: dict[Phase, set[bool]] = {}
+    for _ in range(1000):
+        script.legs_done = script.time_s > 15.0
+        script.run(PERIOD_S)
+        streamed.setdefault(script.sequencer.phase, set()).add(script.sequencer.streaming)
+    assert streamed[Phase.PREFLIGHT] == {False}
+    assert streamed[Phase.TAKEOFF] == {False}
+    assert True in streamed[Phase.LEGS]
+    assert streamed[Phase.DONE] == {False}
+
+
+@pytest.mark.parametrize(
+    ("ending", "kind"), [(EndingAction.HOLD, RequestKind.HOLD), (EndingAction.RETURN, RequestKind.RETURN)]
+)
+def test_the_mission_says_how_it_ends(ending: EndingAction, kind: RequestKind) -> None:
+    """The ending asks for hold or return instead of land."""
+    script = _in_legs(ending)
+    script.legs_done = True
+    script.run(3.0)
+    assert script.asked[-1] is kind
+    assert script.sequencer.phase is Phase.DONE
+
+
+def test_the_pilot_switching_away_ends_the_stream_at_once() -> None:
+    """A mode other than offboard after the grace time: aborted, nothing more is sent, nothing is asked."""
+    script = _in_legs()
+    script.run(5.0)
+    asked = len(script.asked)
+    script.mode = FlightMode.POSITION
+    script.run(0.1)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert not script.sequencer.streaming
+    assert "pilot" in script.sequencer.reason
+    script.run(3.0)
+    assert len(script.asked) == asked
+
+
+def test_refused_arming_aborts_with_the_vehicles_reason() -> None:
+    """The reason names the command and what the vehicle said."""
+    script = _script()
+    script.refuse = {RequestKind.ARM}
+    script.run(5.0)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert script.sequencer.reason == "arm was refused: not now"
+
+
+def test_an_unanswered_take_off_aborts() -> None:
+    """No answer within the time-out counts as refused."""
+    script = _script()
+    script.mute = {RequestKind.TAKEOFF}
+    script.run(10.0)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert "no answer" in script.sequencer.reason
+
+
+def test_refused_offboard_is_asked_again_and_then_given_up() -> None:
+    """Offboard is asked about once a second for ten seconds; then the flight is aborted and the vehicle holds."""
+    script = _script()
+    script.refuse = {RequestKind.OFFBOARD}
+    script.run(25.0)
+    assert 5 <= script.asked.count(RequestKind.OFFBOARD) <= 11
+    assert script.sequencer.phase is Phase.ABORTED
+    assert not script.sequencer.streaming
+
+
+def test_an_uncertain_estimate_does_not_take_off() -> None:
+    """A position sigma of 2 m is not ready to fly; after the time-out the reason says so."""
+    script = _script()
+    script.sigma_m = 2.0
+    script.run(35.0)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert "position sigma 2.00 m" in script.sequencer.reason
+    assert script.asked == []
+
+
+def test_stale_telemetry_stops_the_setpoints_and_fresh_telemetry_brings_them_back() -> None:
+    """Older than half a second: no setpoints, announced; back: setpoints, announced."""
+    script = _in_legs()
+    script.silent = True
+    script.run(0.4)
+    assert script.sequencer.streaming
+    script.run(0.3)
+    assert not script.sequencer.streaming
+    script.silent = False
+    script.run(0.1)
+    assert script.sequencer.streaming
+    assert any("telemetry is 0.5" in text for text in script.texts)
+    assert "telemetry is back" in script.texts
+
+
+def test_lost_telemetry_aborts() -> None:
+    """Five seconds of silence end the flight; PX4's own failsafe has the vehicle by then."""
+    script = _in_legs()
+    script.silent = True
+    script.run(6.0)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert not script.sequencer.streaming
+
+
+def test_one_interrupt_holds_and_then_lands() -> None:
+    """Ctrl-C once: hold, then the mission's ending; the outcome is aborted with that reason."""
+    script = _in_legs()
+    script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
+    script.run(0.1)
+    assert script.asked[-1] is RequestKind.HOLD
+    script.run(5.0)
+    assert script.asked[-1] is RequestKind.LAND
+    assert script.sequencer.phase is Phase.ABORTED
+    assert script.sequencer.reason == "stopped by Ctrl-C"
+    assert not script.sequencer.hand_over
+
+
+def test_two_interrupts_hand_over_at_once() -> None:
+    """Ctrl-C twice: the stream stops in that moment and the driver is told to ask for hold."""
+    script = _in_legs()
+    script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
+    script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
+    assert script.sequencer.phase is Phase.ABORTED
+    assert not script.sequencer.streaming
+    assert script.sequencer.hand_over
+
+
+def test_engage_by_pilot_asks_for_nothing_and_waits_for_offboard() -> None:
+    """The pilot arms, takes off and switches; uasfly streams once it flies and flies once it is offboard."""
+    script = _script(Engage.PILOT)
+    script.run(5.0)
+    assert script.asked == []
+    script.armed = script.in_air = True
+    script.run(20.0)
+    assert script.sequencer.phase is Phase.ENGAGE
+    assert script.sequencer.streaming
+    script.mode = FlightMode.OFFBOARD
+    script.run(0.1)
+    assert script.sequencer.phase is Phase.LEGS
+    assert script.asked == []
+
+
+def test_a_vehicle_that_flies_already_is_not_asked_to_take_off() -> None:
+    """Armed and in the air: straight to engage."""
+    script = _script()
+    script.armed = script.in_air = True
+    script.run(5.0)
+    assert script.asked == [RequestKind.OFFBOARD]
+    assert script.sequencer.phase is Phase.LEGS
+
+
+def test_silence_from_the_start_ends_with_what_was_missing() -> None:
+    """No heartbeat within 15 s: aborted, and the reason says what did not come."""
+    script = _script()
+    script.silent = True
+    script.run(16.0)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert "no heartbeat" in script.sequencer.reason

@@ -1,0 +1,55 @@
+"""The command line: every command, and the one place where an error becomes a message and exit code 2."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from uasfly import __version__
+from uasfly.cli import check, fly, rehearse, sim
+
+EXIT_BAD_INPUT = 2
+
+app = typer.Typer(
+    name="uasfly",
+    help="Flies PX4 multirotors accurately where GNSS is poor and the wind gusts.",
+    no_args_is_help=True,
+    add_completion=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"uasfly {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _root(
+    version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
+) -> None:
+    """Flies PX4 multirotors accurately where GNSS is poor and the wind gusts."""
+
+
+fly.register(app)
+rehearse.register(app)
+check.register(app)
+sim.register(app)
+
+
+def main() -> None:
+    """Entry point: wrong input ends with its message on stderr and exit code 2, without a traceback."""
+    from uasfly.errors import UasflyError
+
+    try:
+        app()
+    except UasflyError as error:
+        sys.stdout.flush()
+        sys.stderr.write(f"uasfly: {error}\n")
+        sys.exit(EXIT_BAD_INPUT)
+    except KeyboardInterrupt:
+        sys.stderr.write("uasfly: interrupted\n")
+        sys.exit(130)

@@ -1,0 +1,26 @@
+"""Options that several commands share, so that they read the same everywhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Airframe = Annotated[str, typer.Option("--airframe", help="Airframe: a shipped name (f550) or a YAML file.")]
+Scenario = Annotated[
+    str, typer.Option("--scenario", help="Scenario of the built-in simulation: a shipped name or a YAML file.")
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random in the simulation.")]
+Controller = Annotated[str, typer.Option("--controller", help="Controller: nmpc, or pid (the paper's backup PIDs).")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="Change a field of a file for this flight, e.g. airframe.model.drag_1_s=[0.3,0.3,0.3] "
+        "or mission.takeoff.height_m=2; may be given several times.",
+    ),
+]
+Log = Annotated[Path | None, typer.Option("--log", help="Flight log (MCAP; opens in Foxglove and PlotJuggler).")]
+Summary = Annotated[Path | None, typer.Option("--summary", help="Write the closing summary to this JSON file.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON instead of a table.")]

@@ -1,0 +1,41 @@
+"""A progress bar for rehearsals on a terminal; nothing where there is none."""
+
+from __future__ import annotations
+
+import types
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from uasfly.messages import Status
+
+CYCLES_PER_UPDATE = 50
+
+
+class RehearsalProgress:
+    """Shows phase and progress of a rehearsal on stderr."""
+
+    def __init__(self, name: str) -> None:
+        """Prepare the bar for a mission of this name."""
+        console = Console(stderr=True)
+        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+        self._progress = Progress(*columns, TimeElapsedColumn(), console=console, disable=not console.is_terminal)
+        self._name = name
+        self._task = self._progress.add_task(name, total=1.0)
+        self._cycles = 0
+
+    def __enter__(self) -> RehearsalProgress:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None
+    ) -> None:
+        self._progress.stop()
+
+    def update(self, status: Status) -> None:
+        """Take in a step's status; the bar moves once a simulated second."""
+        self._cycles += 1
+        if self._cycles % CYCLES_PER_UPDATE == 0:
+            text = f"{self._name}: {status.phase.value}"
+            self._progress.update(self._task, completed=status.progress, description=text)

@@ -1,0 +1,111 @@
+"""What is to be flown: airframe, mission, scenario, seed and controller, read from files and put together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from uasfly.airframe import Airframe
+from uasfly.errors import UasflyError
+from uasfly.files import find_file, load_file, parse_overrides
+from uasfly.flight.pilot import Pilot
+from uasfly.flight.sequencer import Engage
+from uasfly.mission import Mission
+from uasfly.sim.plant import Plant
+from uasfly.sim.scenario import Scenario
+
+CONTROLLERS = ("nmpc", "pid")
+
+
+@dataclass(frozen=True, slots=True)
+class FlightPlan:
+    """Everything that decides how a flight goes."""
+
+    airframe: Airframe
+    mission: Mission
+    controller: str
+    seed: int
+    scenario: Scenario | None = None
+    plant: Plant | None = None
+
+    def description(self) -> dict[str, Any]:
+        """Plain data for the log."""
+        return {
+            "airframe": self.airframe.model_dump(mode="json"),
+            "mission": self.mission.model_dump(mode="json"),
+            "controller": self.controller,
+            "seed": self.seed,
+            "scenario": None if self.scenario is None else self.scenario.model_dump(mode="json"),
+            "plant": None if self.plant is None else self.plant.model_dump(mode="json"),
+        }
+
+    def identity(self) -> dict[str, object]:
+        """Names for the summary."""
+        return {
+            "mission": self.mission.name,
+            "airframe": self.airframe.name,
+            "controller": self.controller,
+            "scenario": None if self.scenario is None else self.scenario.name,
+            "seed": self.seed,
+        }
+
+
+def load_plan(
+    mission: str,
+    airframe: str,
+    *,
+    controller: str = "nmpc",
+    seed: int = 1,
+    scenario: str | None = None,
+    settings: list[str] | None = None,
+) -> FlightPlan:
+    """Read and check the files of a flight.
+
+    Args:
+        mission: name of a shipped file or a path.
+        airframe: name of a shipped file or a path.
+        controller: nmpc or pid.
+        seed: of everything random in the simulation.
+        scenario: name of a shipped file or a path; without one there is no simulation.
+        settings: `--set` texts, `airframe.model.drag_1_s=[0.3, 0.3, 0.3]`, `mission.takeoff.height_m=2` or
+            `scenario.link.telemetry_latency_s=0.02`.
+
+    Raises:
+        FileError: for a file that cannot be used. UasflyError: for a flag that cannot be used.
+    """
+    if controller not in CONTROLLERS:
+        raise UasflyError(f"--controller: expected one of {', '.join(CONTROLLERS)}, found {controller!r}")
+    by_file = _split_settings(settings or [])
+    airframe_model = load_file(find_file("airframe", airframe), Airframe, by_file["airframe"])
+    mission_model = load_file(find_file("mission", mission), Mission, by_file["mission"])
+    scenario_model, plant = None, None
+    if scenario is not None:
+        scenario_model = load_file(find_file("scenario", scenario), Scenario, by_file["scenario"])
+        plant = load_file(find_file("plant", airframe_model.plant), Plant, by_file["plant"])
+    elif by_file["scenario"] or by_file["plant"]:
+        raise UasflyError("--set scenario.* and plant.* need the built-in simulation (--sim or rehearse)")
+    return FlightPlan(airframe_model, mission_model, controller, seed, scenario_model, plant)
+
+
+def build_pilot(plan: FlightPlan, engage: Engage, timer: Callable[[], float] | None) -> Pilot:
+    """Observer, controller and phases for a plan; `timer` (perf_counter) measures the solver, None leaves it out."""
+    from uasfly.control.controller import NmpcController, PidController
+    from uasfly.observer.observer import Observer
+
+    observer = Observer(plan.airframe)
+    controller_type = NmpcController if plan.controller == "nmpc" else PidController
+    return Pilot(plan.airframe, plan.mission, observer, controller_type(plan.airframe, timer=timer), engage)
+
+
+def _split_settings(settings: list[str]) -> dict[str, dict[str, object]]:
+    by_file: dict[str, dict[str, object]] = {"airframe": {}, "mission": {}, "scenario": {}, "plant": {}}
+    for key, value in parse_overrides(settings).items():
+        kind, _, rest = key.partition(".")
+        if kind not in by_file or not rest:
+            raise UasflyError(
+                f"--set {key}: expected a key that begins with {', '.join(f'{k}.' for k in by_file)}, "
+                "for example --set airframe.limits.tilt_deg=25"
+            )
+        by_file[kind][rest] = value
+    return by_file

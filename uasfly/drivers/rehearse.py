@@ -1,0 +1,85 @@
+"""Flies a mission against the simulated vehicle in this process: deterministic and faster than real time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from uasfly.drivers.plan import FlightPlan, build_pilot
+from uasfly.flight.sequencer import Engage
+from uasfly.flight.summary import SummaryCollector
+from uasfly.link.in_process import InProcessLink
+from uasfly.messages import Status
+from uasfly.record.writer import LogWriter
+from uasfly.sim.vehicle import SimulatedVehicle
+
+LONGEST_FLIGHT_S = 3600.0
+
+
+def rehearse(
+    plan: FlightPlan, log: Path | None = None, watch: Callable[[Status], None] | None = None
+) -> dict[str, Any]:
+    """Fly a plan and return its summary.
+
+    The same plan gives the same log, bit for bit; only the summary's times and real-time factor depend on the machine.
+
+    Args:
+        plan: what to fly; it must have a scenario and a plant.
+        log: file for the flight log, None for none.
+        watch: called with each step's status (progress, live view).
+
+    Raises:
+        FileError: when the log cannot be opened.
+    """
+    assert plan.scenario is not None
+    assert plan.plant is not None
+    vehicle = SimulatedVehicle(plan.plant, plan.scenario, plan.seed)
+    settings = plan.scenario.link
+    link = InProcessLink(
+        vehicle,
+        telemetry_latency_s=settings.telemetry_latency_s,
+        command_latency_s=settings.command_latency_s,
+        jitter_s=settings.jitter_s,
+        rng=np.random.default_rng([plan.seed, 7]),
+    )
+    pilot = build_pilot(plan, Engage.AUTO, time.perf_counter)
+    summary = SummaryCollector()
+    writer = LogWriter(log, plan.description()) if log is not None else None
+    period_s = 1.0 / plan.airframe.controller.rate_hz
+    started = time.perf_counter()
+    cycle = 0
+    try:
+        while not pilot.done and cycle * period_s < LONGEST_FLIGHT_S:
+            cycle += 1
+            now_s = cycle * period_s
+            link.advance_to(now_s)
+            truth = vehicle.truth()
+            samples = link.poll()
+            begun = time.perf_counter()
+            result = pilot.step(now_s, samples)
+            if result.setpoint is not None:
+                link.send(result.setpoint)
+                summary.setpoint_sent(now_s)
+            for request in result.requests:
+                link.request(request)
+            summary.timed(
+                None if result.control is None else result.control.solve_ms, (time.perf_counter() - begun) * 1e3
+            )
+            summary.cycle(result.status, (*samples, truth))
+            if writer is not None:
+                for message in (*samples, truth, *result.requests, result.setpoint, result.status):
+                    if message is not None:
+                        writer.write(message, now_s)
+            if watch is not None:
+                watch(result.status)
+    finally:
+        if writer is not None:
+            writer.close()
+            if writer.problem:
+                summary.warn(writer.problem)
+    wall_s = time.perf_counter() - started
+    return summary.result(wall_s=wall_s, rejected=pilot.observer.counters.rejected, **plan.identity())

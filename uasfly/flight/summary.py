@@ -1,0 +1,199 @@
+"""The closing summary of a flight: what was flown, how well it was tracked and what went wrong."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from uasfly.errors import FileError
+from uasfly.messages import Array, OdometrySample, Phase, Sample, Status, TruthSample
+
+KEPT_CYCLES = 256  # truth and GNSS samples are compared with cycles up to this long ago
+
+
+@dataclass(slots=True)
+class _SquareSum:
+    """Running RMS per axis and largest norm."""
+
+    count: int = 0
+    squares: Array = field(default_factory=lambda: np.zeros(3))
+    largest: float = 0.0
+
+    def add(self, error: Array) -> None:
+        self.count += 1
+        self.squares += error * error
+        self.largest = max(self.largest, math.sqrt(float(error @ error)))
+
+    def rms(self) -> dict[str, float] | None:
+        if self.count == 0:
+            return None
+        x, y, z = np.sqrt(self.squares / self.count).tolist()
+        return {"x": x, "y": y, "z": z, "total": math.sqrt(float(self.squares.sum()) / self.count)}
+
+
+@dataclass(frozen=True, slots=True)
+class _Cycle:
+    time_s: float
+    estimate: Array
+    reference: Array
+
+
+@dataclass(slots=True)
+class SummaryCollector:
+    """Collects a flight's figures cycle by cycle; the driver adds what only a clock can know.
+
+    Errors are counted while the legs fly: truth minus reference where there is truth, else estimate minus reference.
+    Truth arrives later than it was true, so each truth sample is compared with the cycles around its own time.
+    """
+
+    duration_s: float = 0.0
+    _first_s: float | None = None
+    _cycles: deque[_Cycle] = field(default_factory=lambda: deque(maxlen=KEPT_CYCLES))
+    _truths: deque[TruthSample] = field(default_factory=lambda: deque(maxlen=KEPT_CYCLES))
+    _pending_truth: deque[TruthSample] = field(default_factory=lambda: deque(maxlen=KEPT_CYCLES))
+    _pending_gnss: deque[OdometrySample] = field(default_factory=lambda: deque(maxlen=KEPT_CYCLES))
+    _tracking_true: _SquareSum = field(default_factory=_SquareSum)
+    _tracking_estimated: _SquareSum = field(default_factory=_SquareSum)
+    _estimate: _SquareSum = field(default_factory=_SquareSum)
+    _gnss: _SquareSum = field(default_factory=_SquareSum)
+    _force_sum: Array = field(default_factory=lambda: np.zeros(3))
+    _force_count: int = 0
+    _solve_ms: list[float] = field(default_factory=list)
+    _cycle_ms: list[float] = field(default_factory=list)
+    _setpoint_times_s: list[float] = field(default_factory=list)
+    _fallbacks: dict[str, int] = field(default_factory=dict)
+    _warnings: list[str] = field(default_factory=list)
+    _phase: Phase = Phase.CONNECT
+    _reason: str = ""
+
+    def cycle(self, status: Status, samples: tuple[Sample, ...]) -> None:
+        """Take in one step's samples and status."""
+        if self._first_s is None:
+            self._first_s = status.time_s
+        self.duration_s = status.time_s - self._first_s
+        self._phase, self._reason = status.phase, status.reason or self._reason
+        for severity, text in status.announcements:
+            if severity <= 4 and text not in self._warnings:
+                self._warnings.append(text)
+        if status.phase in (Phase.ENGAGE, Phase.LEGS) and status.fallback:
+            self._fallbacks[status.fallback] = self._fallbacks.get(status.fallback, 0) + 1
+        flying = status.phase is Phase.LEGS and status.estimate is not None
+        if flying and status.reference_position_in_world is not None and status.leg_started:
+            estimate = status.estimate
+            assert estimate is not None
+            reference = status.reference_position_in_world
+            self._cycles.append(_Cycle(status.time_s, estimate.position_in_world, reference))
+            self._tracking_estimated.add(estimate.position_in_world - reference)
+            self._force_sum += estimate.force_in_world
+            self._force_count += 1
+        for sample in samples:
+            if isinstance(sample, TruthSample):
+                self._pending_truth.append(sample)
+                self._truths.append(sample)
+            elif isinstance(sample, OdometrySample):
+                self._pending_gnss.append(sample)
+        self._compare()
+
+    def setpoint_sent(self, time_s: float) -> None:
+        """A setpoint has left at `time_s`."""
+        self._setpoint_times_s.append(time_s)
+
+    def timed(self, solve_ms: float | None, cycle_ms: float) -> None:
+        """Times of one cycle by the driver's clock; `solve_ms` is None where nothing was solved."""
+        if solve_ms is not None:
+            self._solve_ms.append(solve_ms)
+        self._cycle_ms.append(cycle_ms)
+
+    def warn(self, text: str) -> None:
+        """Add a warning that did not come from the step."""
+        if text not in self._warnings:
+            self._warnings.append(text)
+
+    def result(self, *, wall_s: float, rejected: dict[str, int], **identity: object) -> dict[str, Any]:
+        """The summary as plain data; `identity` (airframe, mission, scenario, seed, ...) is copied into it."""
+        tracking = self._tracking_true if self._tracking_true.count else self._tracking_estimated
+        times = np.array(self._setpoint_times_s)
+        gaps = np.diff(times)
+        span = float(times[-1] - times[0]) if len(times) > 1 else 0.0
+        force = self._force_sum / max(1, self._force_count)
+        return {
+            "outcome": "completed" if self._phase is Phase.DONE else "aborted",
+            "reason": self._reason if self._phase is not Phase.DONE else "",
+            **identity,
+            "duration_s": round(self.duration_s, 3),
+            "tracking_rms_m": _rounded(tracking.rms()),
+            "tracking_max_m": round(tracking.largest, 5) if tracking.count else None,
+            "tracking_against": "truth" if self._tracking_true.count else "estimate",
+            "estimate_rms_m": _rounded(self._estimate.rms()),
+            "gnss_rms_m": _rounded(self._gnss.rms()),
+            "solve_ms": _quantiles(self._solve_ms),
+            "cycle_ms": _quantiles(self._cycle_ms),
+            "setpoint_rate_hz": round(len(gaps) / span, 3) if span > 0.0 else 0.0,
+            "setpoint_gap_max_s": round(float(gaps.max()), 4) if len(gaps) else None,
+            "fallback_steps": sum(self._fallbacks.values()),
+            "fallbacks": dict(self._fallbacks),
+            "rejected": dict(rejected),
+            "force_m_s2": [round(value, 4) for value in force.tolist()],
+            "real_time_factor": round(self.duration_s / wall_s, 3) if wall_s > 0.0 else None,
+            "warnings": list(self._warnings),
+        }
+
+    def _compare(self) -> None:
+        """Compare truth with the cycles, and GNSS with truth, as soon as both sides of a sample are there."""
+        while self._pending_truth and self._cycles and self._pending_truth[0].time_s <= self._cycles[-1].time_s:
+            truth = self._pending_truth.popleft()
+            around = _around(self._cycles, truth.time_s)
+            if around is None:
+                continue
+            before, after, weight = around
+            estimate = before.estimate + weight * (after.estimate - before.estimate)
+            reference = before.reference + weight * (after.reference - before.reference)
+            self._tracking_true.add(truth.position_in_world - reference)
+            self._estimate.add(estimate - truth.position_in_world)
+        while self._pending_gnss and self._truths and self._pending_gnss[0].time_s <= self._truths[-1].time_s:
+            gnss = self._pending_gnss.popleft()
+            if not self._cycles or not self._cycles[0].time_s <= gnss.time_s <= self._cycles[-1].time_s:
+                continue
+            pair = _around(self._truths, gnss.time_s)
+            if pair is not None:
+                first, second, weight = pair
+                true_position = first.position_in_world + weight * (second.position_in_world - first.position_in_world)
+                self._gnss.add(gnss.position_in_world - true_position)
+
+
+def _around(items: deque[Any], time_s: float) -> tuple[Any, Any, float] | None:
+    """The two items on both sides of a time and the weight of the second; None outside."""
+    for k in range(len(items) - 1, 0, -1):
+        if items[k - 1].time_s <= time_s <= items[k].time_s:
+            span = items[k].time_s - items[k - 1].time_s
+            return items[k - 1], items[k], (time_s - items[k - 1].time_s) / span if span > 0.0 else 0.0
+    return None
+
+
+def _rounded(values: dict[str, float] | None) -> dict[str, float] | None:
+    return None if values is None else {key: round(value, 5) for key, value in values.items()}
+
+
+def _quantiles(values: list[float]) -> dict[str, float] | None:
+    if not values:
+        return None
+    median, p99 = np.percentile(values, (50, 99)).tolist()
+    return {"median": round(median, 4), "p99": round(p99, 4), "max": round(max(values), 4)}
+
+
+def write_summary(summary: dict[str, Any], path: Path) -> None:
+    """Write the summary as JSON.
+
+    Raises:
+        FileError: when the file cannot be written.
+    """
+    try:
+        path.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise FileError(str(path), [f"the summary cannot be written: {error.strerror or error}"]) from error

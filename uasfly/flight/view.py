@@ -1,0 +1,79 @@
+"""The newest of what the vehicle has said: the sequencer and the monitors look here."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from uasfly.messages import (
+    AttitudeTargetSample,
+    BatterySample,
+    FlightMode,
+    HealthSample,
+    OdometrySample,
+    RequestResult,
+    Sample,
+    TextSample,
+    VehicleSample,
+)
+
+
+@dataclass(slots=True)
+class VehicleView:
+    """Newest sample of each kind, and the answers and texts that came with the last step."""
+
+    odometry: OdometrySample | None = None
+    vehicle: VehicleSample | None = None
+    battery: BatterySample | None = None
+    health: HealthSample | None = None
+    attitude_target: AttitudeTargetSample | None = None
+    results: list[RequestResult] = field(default_factory=list)
+    texts: list[TextSample] = field(default_factory=list)
+
+    def update(self, samples: tuple[Sample, ...]) -> None:
+        """Take in a step's samples; results and texts are those of this step only."""
+        self.results.clear()
+        self.texts.clear()
+        for sample in samples:
+            match sample:
+                case OdometrySample():
+                    if self.odometry is None or sample.time_s > self.odometry.time_s:
+                        self.odometry = sample
+                case VehicleSample():
+                    self.vehicle = sample
+                case AttitudeTargetSample():
+                    self.attitude_target = sample
+                case BatterySample():
+                    self.battery = sample
+                case HealthSample():
+                    self.health = sample
+                case RequestResult():
+                    self.results.append(sample)
+                case TextSample():
+                    self.texts.append(sample)
+
+    def odometry_age_s(self, time_s: float) -> float:
+        """Age of the newest odometry, infinite before the first."""
+        return math.inf if self.odometry is None else time_s - self.odometry.time_s
+
+    @property
+    def in_air(self) -> bool:
+        """Whether the vehicle says that it flies."""
+        return self.vehicle is not None and self.vehicle.in_air
+
+    @property
+    def armed(self) -> bool:
+        """Whether the vehicle says that it is armed."""
+        return self.vehicle is not None and self.vehicle.armed
+
+    @property
+    def mode(self) -> FlightMode:
+        """The vehicle's mode, OTHER before the first heartbeat."""
+        return FlightMode.OTHER if self.vehicle is None else self.vehicle.mode
+
+    @property
+    def voltage_v(self) -> float | None:
+        """Battery voltage, None while unknown."""
+        if self.battery is None or not math.isfinite(self.battery.voltage_v) or self.battery.voltage_v <= 0.0:
+            return None
+        return self.battery.voltage_v

@@ -1,0 +1,1 @@
+"""The vehicle as seen from a companion computer."""

@@ -1,0 +1,217 @@
+"""The in-process end of the link: a simulated vehicle in the same process, with latency, deterministic.
+
+It stands for MAVLink over a wire: samples arrive later than they were true, setpoints act later than they were sent,
+the rates are those that the MAVSDK end asks PX4 for.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from uasfly.frames import quaternion_from_euler
+from uasfly.link.encode import check_setpoint
+from uasfly.messages import (
+    Array,
+    AttitudeTargetSample,
+    BatterySample,
+    FlightMode,
+    HealthSample,
+    OdometrySample,
+    Request,
+    RequestKind,
+    RequestResult,
+    Sample,
+    Setpoint,
+    TextSample,
+    VehicleSample,
+)
+
+ODOMETRY_RATE_HZ = 100.0
+ATTITUDE_TARGET_RATE_HZ = 50.0
+STATE_RATE_HZ = 2.0
+BATTERY_RATE_HZ = 1.0
+HEALTH_RATE_HZ = 1.0
+ANSWER_LATENCY_S = 0.01
+
+_MODES = {
+    RequestKind.TAKEOFF: FlightMode.TAKEOFF,
+    RequestKind.OFFBOARD: FlightMode.OFFBOARD,
+    RequestKind.HOLD: FlightMode.HOLD,
+    RequestKind.LAND: FlightMode.LAND,
+    RequestKind.RETURN: FlightMode.RETURN,
+}
+
+
+class DirectVehicle(Protocol):
+    """What this end needs of a simulated vehicle; times are the vehicle's, which here are also the host's."""
+
+    @property
+    def time_s(self) -> float:
+        """Time since boot [s]."""
+        ...
+
+    def advance_to(self, time_s: float) -> None:
+        """Let the vehicle live until then."""
+        ...
+
+    def set_attitude_target(self, quaternion_body_to_world: Array, thrust: float, yaw_rate_rad_s: float | None) -> None:
+        """Take an attitude and thrust setpoint."""
+        ...
+
+    def set_mode(self, mode: FlightMode) -> tuple[bool, str]:
+        """Change the mode; whether it was accepted, and why not."""
+        ...
+
+    def set_takeoff_height(self, height_m: float) -> None:
+        """Set how high above the ground the next take-off goes."""
+        ...
+
+    def arm(self) -> tuple[bool, str]:
+        """Arm; whether it was accepted, and why not."""
+        ...
+
+    def disarm(self) -> tuple[bool, str]:
+        """Disarm; whether it was accepted, and why not."""
+        ...
+
+    def odometry(self) -> OdometrySample:
+        """The vehicle's own estimate, now."""
+        ...
+
+    def attitude_target(self) -> AttitudeTargetSample:
+        """What the attitude controller is asked for, now."""
+        ...
+
+    def battery(self) -> BatterySample:
+        """Battery, now."""
+        ...
+
+    def state(self) -> VehicleSample:
+        """Mode, arming and landed state, now."""
+        ...
+
+    def health(self) -> HealthSample:
+        """Estimator and GNSS, now."""
+        ...
+
+    def take_texts(self) -> Sequence[TextSample]:
+        """Status texts since the last call."""
+        ...
+
+
+class InProcessLink:
+    """Link to a simulated vehicle that is advanced by this object; see `VehicleLink`."""
+
+    def __init__(
+        self,
+        vehicle: DirectVehicle,
+        telemetry_latency_s: float,
+        command_latency_s: float,
+        jitter_s: float,
+        rng: np.random.Generator,
+    ) -> None:
+        self._vehicle = vehicle
+        self._telemetry_latency_s = telemetry_latency_s
+        self._command_latency_s = command_latency_s
+        self._jitter_s = jitter_s
+        self._rng = rng
+        self._order = itertools.count()  # ties in time keep the order in which they came up
+        self._arrivals: list[tuple[float, int, Sample]] = []
+        self._commands: list[tuple[float, int, Setpoint | Request]] = []
+        self._now_s = vehicle.time_s
+        self._ticks = [
+            _Tick(1.0 / ODOMETRY_RATE_HZ, vehicle.odometry),
+            _Tick(1.0 / ATTITUDE_TARGET_RATE_HZ, vehicle.attitude_target),
+            _Tick(1.0 / STATE_RATE_HZ, vehicle.state),
+            _Tick(1.0 / BATTERY_RATE_HZ, vehicle.battery),
+            _Tick(1.0 / HEALTH_RATE_HZ, vehicle.health),
+        ]
+
+    def advance_to(self, time_s: float) -> None:
+        """Let the vehicle and both directions of the wire run until `time_s`."""
+        while True:
+            next_tick = min(self._ticks, key=_due)
+            due = min(next_tick.due_s, self._commands[0][0] if self._commands else math.inf)
+            if due > time_s:
+                break
+            self._vehicle.advance_to(due)
+            if self._commands and self._commands[0][0] <= next_tick.due_s:
+                self._deliver(heapq.heappop(self._commands)[2])
+            else:
+                self._arrive(next_tick.read())
+                next_tick.count += 1
+            for text in self._vehicle.take_texts():
+                self._arrive(text)
+        self._vehicle.advance_to(time_s)
+        self._now_s = time_s
+
+    def poll(self) -> tuple[Sample, ...]:
+        """Samples that have arrived by now, oldest arrival first."""
+        arrived: list[Sample] = []
+        while self._arrivals and self._arrivals[0][0] <= self._now_s:
+            arrived.append(heapq.heappop(self._arrivals)[2])
+        return tuple(arrived)
+
+    def send(self, setpoint: Setpoint) -> None:
+        """Send one setpoint; it acts after the command latency. See `check_setpoint` for what is refused."""
+        check_setpoint(setpoint)
+        heapq.heappush(self._commands, (self._now_s + self._command_latency(), next(self._order), setpoint))
+
+    def request(self, request: Request) -> None:
+        """Ask the vehicle; the answer arrives as a RequestResult."""
+        heapq.heappush(self._commands, (self._now_s + self._command_latency(), next(self._order), request))
+
+    def _command_latency(self) -> float:
+        return self._command_latency_s + self._jitter_s * float(self._rng.random())
+
+    def _arrive(self, sample: Sample) -> None:
+        latency = self._telemetry_latency_s + self._jitter_s * float(self._rng.random())
+        heapq.heappush(self._arrivals, (self._vehicle.time_s + latency, next(self._order), sample))
+
+    def _deliver(self, command: Setpoint | Request) -> None:
+        vehicle = self._vehicle
+        if isinstance(command, Setpoint):
+            quaternion = quaternion_from_euler(command.roll_rad, command.pitch_rad, command.yaw_rad)
+            vehicle.set_attitude_target(quaternion, command.thrust, command.yaw_rate_rad_s)
+            return
+        match command.kind:
+            case RequestKind.ARM:
+                accepted, text = vehicle.arm()
+            case RequestKind.DISARM:
+                accepted, text = vehicle.disarm()
+            case _:
+                if command.kind is RequestKind.TAKEOFF:
+                    vehicle.set_takeoff_height(command.height_m)
+                accepted, text = vehicle.set_mode(_MODES[command.kind])
+        arrival = self._vehicle.time_s + ANSWER_LATENCY_S
+        result = RequestResult(self._vehicle.time_s, command, accepted, text)
+        heapq.heappush(self._arrivals, (arrival, next(self._order), result))
+
+
+class _Tick:
+    """A stream with a fixed rate: when it is due next, and how to read it."""
+
+    __slots__ = ("count", "period_s", "read")
+
+    def __init__(self, period_s: float, read: _Reader) -> None:
+        self.period_s = period_s
+        self.read = read
+        self.count = 1
+
+    @property
+    def due_s(self) -> float:
+        return self.count * self.period_s
+
+
+class _Reader(Protocol):
+    def __call__(self) -> Sample: ...
+
+
+def _due(tick: _Tick) -> float:
+    return tick.due_s

@@ -1,0 +1,27 @@
+"""The vehicle as the flight sees it: one protocol with two ends, MAVSDK and in-process."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from uasfly.messages import Request, Sample, Setpoint
+
+
+class VehicleLink(Protocol):
+    """What every end of the link offers to a driver. All times are the host's, see `messages`."""
+
+    def poll(self) -> tuple[Sample, ...]:
+        """Samples that have arrived since the last call, oldest first; never blocks."""
+        ...
+
+    def send(self, setpoint: Setpoint) -> None:
+        """Send one setpoint, once.
+
+        Raises:
+            ValueError: when a field is not finite or the thrust is outside 0..1: such a setpoint never leaves.
+        """
+        ...
+
+    def request(self, request: Request) -> None:
+        """Ask the vehicle for something; the answer comes as a RequestResult in a later `poll`."""
+        ...

@@ -1,0 +1,1 @@
+"""The simulated vehicle: plant, wind, sensors, a PX4-like autopilot and its MAVLink server."""
