@@ -203,7 +203,7 @@ class Sequencer:
 
     def _legs(self, time_s: float, view: VehicleView, legs_done: bool, requests: list[Request]) -> None:
         self.streaming = not self._stale
-        if self._taken_over(time_s, view):
+        if self._taken_over(view):
             self._abort(time_s, f"the vehicle left offboard for {view.mode.value}: the pilot has it")
         elif legs_done:
             self._enter(time_s, Phase.ENDING)
@@ -229,7 +229,7 @@ class Sequencer:
 
     # ------------------------------------------------------------------ parts
 
-    def _taken_over(self, time_s: float, view: VehicleView) -> bool:
+    def _taken_over(self, view: VehicleView) -> bool:
         if view.vehicle is None or self._offboard_since_s is None or view.mode is FlightMode.OFFBOARD:
             return False
         return view.vehicle.time_s > self._offboard_since_s + HEARTBEAT_GRACE_S and not self._stale

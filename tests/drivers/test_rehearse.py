@@ -1,0 +1,143 @@
+"""Rehearsals: whole flights in one process, deterministic, and better than the paper's backup PIDs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from uasfly.drivers.plan import FlightPlan, load_plan
+from uasfly.drivers.rehearse import rehearse
+from uasfly.errors import FileError, UasflyError
+from uasfly.messages import OdometrySample, Phase, Setpoint, Status, TruthSample
+from uasfly.record.reader import LogReader
+
+SHORT = ["mission.legs[0].duration_s=8"]
+
+
+def _short(seed: int = 1, scenario: str = "blower_hover") -> FlightPlan:
+    return load_plan("hover", "f550", scenario=scenario, seed=seed, settings=SHORT)
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
+    """One short flight and its log."""
+    log = tmp_path_factory.mktemp("flown") / "flight.mcap"
+    return rehearse(_short(), log), log
+
+
+def test_a_flight_completes_and_its_summary_says_everything(flown: tuple[dict[str, Any], Path]) -> None:
+    """Outcome, errors, rates, times, fallbacks, rejections, force and warnings are all there."""
+    summary, _ = flown
+    assert summary["outcome"] == "completed"
+    assert summary["reason"] == ""
+    assert {"airframe", "scenario", "seed", "mission", "controller"} <= set(summary)
+    for key in ("tracking_rms_m", "estimate_rms_m", "gnss_rms_m"):
+        assert set(summary[key]) == {"x", "y", "z", "total"}
+    assert summary["tracking_against"] == "truth"
+    assert 0.0 < summary["estimate_rms_m"]["total"] < summary["gnss_rms_m"]["total"]
+    assert 0.015 < summary["gnss_rms_m"]["total"] < 0.02  # 1 cm on each axis
+    assert set(summary["solve_ms"]) == set(summary["cycle_ms"]) == {"median", "p99", "max"}
+    assert summary["setpoint_rate_hz"] == pytest.approx(50.0, abs=0.01)
+    assert summary["setpoint_gap_max_s"] == pytest.approx(0.02, abs=1e-9)
+    assert summary["fallback_steps"] == 0
+    assert len(summary["force_m_s2"]) == 3
+
+
+def test_the_same_seed_gives_the_same_log_bit_for_bit(flown: tuple[dict[str, Any], Path], tmp_path: Path) -> None:
+    """Nothing of the clock or the process enters a rehearsal."""
+    again = tmp_path / "again.mcap"
+    rehearse(_short(), again)
+    assert again.read_bytes() == flown[1].read_bytes()
+
+
+def test_another_seed_gives_another_flight(flown: tuple[dict[str, Any], Path], tmp_path: Path) -> None:
+    """The seed reaches noise and turbulence."""
+    other = rehearse(_short(seed=2))
+    assert other["tracking_rms_m"] != flown[0]["tracking_rms_m"]
+
+
+def test_the_log_holds_the_whole_flight(flown: tuple[dict[str, Any], Path]) -> None:
+    """Every cycle's status, every setpoint, the odometry at 100 Hz, truth, and what was flown."""
+    summary, path = flown
+    reader = LogReader(path)
+    assert reader.description()["airframe"]["name"] == "f550"
+    logged = list(reader.messages())
+    assert reader.complete
+    kinds = [type(entry.message) for entry in logged]
+    cycles = summary["duration_s"] * 50.0
+    assert kinds.count(Status) == pytest.approx(cycles, abs=2)
+    assert kinds.count(TruthSample) == kinds.count(Status)
+    assert kinds.count(OdometrySample) == pytest.approx(2.0 * cycles, rel=0.01)
+    assert logged[-1].message.phase is Phase.DONE
+    setpoints = [entry.message for entry in logged if isinstance(entry.message, Setpoint)]
+    assert all(0.0 <= setpoint.thrust <= 1.0 for setpoint in setpoints)
+
+
+def test_the_hand_over_is_bumpless(flown: tuple[dict[str, Any], Path]) -> None:
+    """In the first second of streaming roll and pitch setpoints stay near level and thrust near hover in calm air."""
+    logged = [entry.message for entry in LogReader(flown[1]).messages()]
+    setpoints = [message for message in logged if isinstance(message, Setpoint)][:50]
+    assert max(abs(s.roll_rad) for s in setpoints) < 0.1
+    assert max(abs(s.pitch_rad) for s in setpoints) < 0.1
+    thrusts = np.array([s.thrust for s in setpoints])
+    assert float(np.ptp(thrusts)) < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("mission", "scenario", "limit_m"), [("hover", "blower_hover", 0.05)])
+def test_wind_is_held_twice_as_well_as_by_the_backup_pids(mission: str, scenario: str, limit_m: float) -> None:
+    """The blower's whole programme: below the limit, and less than half of what the PIDs stray on the same seed."""
+    nmpc = rehearse(load_plan(mission, "f550", scenario=scenario, seed=1))
+    pid = rehearse(load_plan(mission, "f550", scenario=scenario, seed=1, controller="pid"))
+    assert nmpc["outcome"] == pid["outcome"] == "completed"
+    assert nmpc["tracking_rms_m"]["total"] <= limit_m
+    assert pid["tracking_rms_m"]["total"] >= 2.0 * nmpc["tracking_rms_m"]["total"]
+
+
+def test_every_shipped_mission_is_flown_to_its_end() -> None:
+    """Shortened where it can be, each mission completes in calm air."""
+    shorter = {
+        "hover": ["mission.legs[0].duration_s=2"],
+        "back_and_forth": ["mission.legs[0].duration_s=20"],
+        "spiral": ["mission.legs[0].turns=0.5", "mission.legs[0].duration_s=20"],
+    }
+    for mission in ("hover", "back_and_forth", "spiral", "line"):
+        summary = rehearse(load_plan(mission, "f550", scenario="calm", settings=shorter.get(mission, [])))
+        assert summary["outcome"] == "completed", (mission, summary["reason"])
+        assert summary["tracking_rms_m"]["total"] < 0.05, mission
+
+
+def test_settings_reach_their_files() -> None:
+    """--set changes the named field of the named file and nothing else."""
+    plan = load_plan("hover", "f550", scenario="calm", settings=["airframe.model.drag_1_s=[0.3, 0.3, 0.3]"])
+    assert plan.airframe.model.drag_1_s == (0.3, 0.3, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("settings", "match"),
+    [
+        (["foo=1"], "begins with"),
+        (["airframe.limits.tilt=1"], "tilt"),
+        (["airframe.limits.tilt_deg=abc"], "expected a number"),
+        (["nonsense"], "key=value"),
+    ],
+)
+def test_wrong_settings_are_refused(settings: list[str], match: str) -> None:
+    """The error says what was expected."""
+    with pytest.raises(UasflyError, match=match):
+        load_plan("hover", "f550", scenario="calm", settings=settings)
+
+
+def test_an_unknown_controller_is_refused() -> None:
+    """The error lists the controllers."""
+    with pytest.raises(UasflyError, match="nmpc, pid"):
+        load_plan("hover", "f550", controller="lqr")
+
+
+def test_an_unknown_mission_is_refused_with_what_there_is() -> None:
+    """The error lists the shipped missions."""
+    with pytest.raises(FileError, match="back_and_forth"):
+        load_plan("hoover", "f550")

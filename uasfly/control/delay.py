@@ -1,0 +1,88 @@
+"""Dead time: where the vehicle will be when the command acts that is computed now."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from uasfly.airframe import GRAVITY_M_S2, ModelParameters
+from uasfly.control.buffered import BufferedFunction
+from uasfly.control.transcription import interval_function
+from uasfly.messages import Array, Setpoint
+from uasfly.model import PARAMETER_K_THRUST, PITCH, ROLL, STATES
+
+LONGEST_PREDICTION_S = 0.5
+
+
+class DelayPredictor:
+    """Predicts with the model of the controller and the setpoints that were sent, each acting `command_delay_s` later.
+
+    The attitude loops are solved exactly from the measured attitude, position and velocity with the same step as in
+    the transcription, so controller and prediction agree.
+    """
+
+    def __init__(self, model: ModelParameters) -> None:
+        self._model = model
+        self._interval = BufferedFunction(interval_function())
+        # From when each setpoint acts [s]; the first one acts since ever, None where it is not known.
+        self._history: deque[tuple[float, Setpoint | None]] = deque(((-math.inf, None),), maxlen=256)
+
+    def reset(self, setpoint: Setpoint | None) -> None:
+        """Forget what was sent; `setpoint` is what the vehicle was being told so far, if that is known."""
+        self._history.clear()
+        self._history.append((-math.inf, setpoint))
+
+    def sent(self, setpoint: Setpoint) -> None:
+        """Remember a setpoint, sent at its `time_s`."""
+        self._history.append((setpoint.time_s + self._model.command_delay_s, setpoint))
+
+    def predict(
+        self, state: Array, yaw_rad: float, yaw_rate_rad_s: float, parameters: Array, from_s: float, to_s: float
+    ) -> tuple[Array, float]:
+        """State (8,) and yaw [rad] at `to_s` from those at `from_s`.
+
+        Args:
+            state: (8,) of the controller's model at `from_s`.
+            yaw_rad: at `from_s`.
+            yaw_rate_rad_s: taken as constant.
+            parameters: (11,) of the model, with the force.
+            from_s: time of the estimate.
+            to_s: when the next command acts; at most 0.5 s are predicted.
+        """
+        to_s = min(to_s, from_s + LONGEST_PREDICTION_S)
+        history = self._history
+        while len(history) > 1 and history[1][0] <= from_s:
+            history.popleft()
+        arguments, at = self._interval.arguments, from_s
+        arguments[0][:], arguments[2][:], arguments[4][0] = state, parameters, yaw_rate_rad_s
+        for index, (_, setpoint) in enumerate(history):
+            end = min(history[index + 1][0], to_s) if index + 1 < len(history) else to_s
+            if end <= at:
+                continue
+            arguments[1][:] = self._unknown_inputs(state, parameters) if setpoint is None else inputs_of(setpoint)
+            arguments[3][0], arguments[5][0] = yaw_rad + yaw_rate_rad_s * (at - from_s), end - at
+            self._interval.call()
+            arguments[0][:] = self._interval.results[0]
+            at = end
+        return arguments[0].copy(), yaw_rad + yaw_rate_rad_s * max(to_s - from_s, 0.0)
+
+    def _unknown_inputs(self, state: Array, parameters: Array) -> tuple[float, float, float]:
+        """Thrust, roll and pitch command (3,) that keep attitude and height: the guess where nothing is known."""
+        model, roll, pitch = self._model, float(state[ROLL]), float(state[PITCH])
+        level = max(math.cos(roll) * math.cos(pitch), 0.5)
+        hover = GRAVITY_M_S2 / float(parameters[PARAMETER_K_THRUST])
+        return min(hover / level, 1.0), roll / model.roll.gain, pitch / model.pitch.gain
+
+
+def inputs_of(setpoint: Setpoint) -> tuple[float, float, float]:
+    """Inputs (3,) of the controller's model: thrust, roll and pitch command."""
+    return setpoint.thrust, setpoint.roll_rad, setpoint.pitch_rad
+
+
+def state_of(position: Array, velocity: Array, roll_rad: float, pitch_rad: float) -> Array:
+    """State (8,) of the controller's model."""
+    state = np.empty(STATES)
+    state[:3], state[3:6], state[ROLL], state[PITCH] = position, velocity, roll_rad, pitch_rad
+    return state

@@ -1,0 +1,58 @@
+/* Primal-dual active set: guess which inputs are held at a bound, sweep, correct the guess until it stands. */
+
+static void hold(stage_t *stage, int i) {
+  signed char side = stage->active[i];
+  stage->free[i] = side == 0;
+  stage->fixed[i] = side < 0 ? stage->lower[i] : side > 0 ? stage->upper[i] : 0.0;
+}
+
+static void active_set_sweep(const problem_t *problem, stage_t *stages) {
+  int nodes = problem->nodes;
+  terminal_cost(problem, &stages[nodes]);
+  for (int k = nodes - 1; k >= 0; k--) {
+    stage_t *s = &stages[k], *after = s + 1;
+    const double *arguments[10] = {after->P, after->p, s->jacobian, s->defect, s->q, s->r,
+                                   problem->state_weight + k * NX, problem->input_weight + k * NU, s->free, s->fixed};
+    double *results[7] = {s->P, s->p, s->K, s->k, s->Hux, s->Huu, s->hu};
+    uasfly_backward(arguments, results, NONE);
+  }
+  for (int k = 0; k < nodes; k++) {
+    stage_t *s = &stages[k];
+    const double *arguments[10] = {s->dx, s->jacobian, s->defect, s->K, s->k, s->Hux, s->Huu, s->hu, s->free, s->fixed};
+    double *results[3] = {s[1].dx, s->du, s->gradient};
+    uasfly_forward(arguments, results, NONE);
+  }
+}
+
+/* Returns how many inputs still changed sides in the last sweep: 0 when the set stands and the result is exact. */
+static int active_set(const problem_t *problem, stage_t *stages, int most, int *sweeps) {
+  int nodes = problem->nodes, changes = 1, last = 0;
+  double tolerance = problem->bound_tolerance;
+  for (int k = 0; k < nodes; k++)
+    for (int i = 0; i < NU; i++) hold(&stages[k], i);
+  for (int sweep = 1; sweep <= most; sweep++) {
+    active_set_sweep(problem, stages);
+    ++*sweeps;
+    changes = 0;
+    for (int k = 0; k < nodes; k++) {
+      stage_t *s = &stages[k];
+      for (int i = 0; i < NU; i++) {
+        signed char side = s->active[i];
+        if (side == 0) {
+          if (s->du[i] < s->lower[i] - tolerance) side = -1;
+          if (s->du[i] > s->upper[i] + tolerance) side = 1;
+        } else if (side * s->gradient[i] > tolerance) { /* the cost falls towards the inside: let go */
+          side = 0;
+        }
+        if (side != s->active[i]) {
+          s->active[i] = side;
+          hold(s, i);
+          changes++;
+        }
+      }
+    }
+    if (changes == 0 || (sweep >= 3 && changes >= last)) break;
+    last = changes;
+  }
+  return changes;
+}

@@ -1,0 +1,52 @@
+"""Which messages the link asks the vehicle for, and how often."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from uasfly.link.commands import CommandChannel, Ending
+from uasfly.link.modes import CMD_REQUEST_MESSAGE, CMD_SET_MESSAGE_INTERVAL
+
+GPS_GLOBAL_ORIGIN_ID = 49
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """A message that is asked for at a rate."""
+
+    name: str
+    message_id: int
+    rate_hz: float
+
+
+STREAMS = (
+    Stream("ODOMETRY", 331, 100.0),
+    Stream("ATTITUDE_TARGET", 83, 50.0),
+    Stream("CURRENT_MODE", 436, 50.0),  # PX4 sends it on a change and twice a second; HEARTBEAT stays at 1 Hz
+    Stream("EXTENDED_SYS_STATE", 245, 10.0),
+    Stream("ESTIMATOR_STATUS", 230, 5.0),
+    Stream("BATTERY_STATUS", 147, 2.0),
+)
+TRUTH_STREAMS = (
+    Stream("DEBUG_FLOAT_ARRAY", 350, 50.0),  # uasfly's simulated vehicle
+    Stream("HIL_STATE_QUATERNION", 115, 50.0),  # PX4's SIH
+)
+
+
+async def ask_for_streams(commands: CommandChannel, want_truth: bool) -> list[str]:
+    """Set the message intervals, one after the other.
+
+    Returns:
+        Texts about what the vehicle does not send as asked; truth is not among them, no real vehicle has it.
+    """
+    problems = []
+    for stream in STREAMS:
+        outcome = await commands.command(CMD_SET_MESSAGE_INTERVAL, (float(stream.message_id), 1e6 / stream.rate_hz))
+        if not outcome.accepted:
+            why = "refuses" if outcome.ending is Ending.ANSWERED else "does not answer"
+            problems.append(f"{stream.name} at {stream.rate_hz:g} Hz: the vehicle {why}, its own rate stays")
+    if want_truth:
+        for stream in TRUTH_STREAMS:
+            await commands.command(CMD_SET_MESSAGE_INTERVAL, (float(stream.message_id), 1e6 / stream.rate_hz), 1)
+        await commands.command(CMD_REQUEST_MESSAGE, (float(GPS_GLOBAL_ORIGIN_ID),), 1)
+    return problems

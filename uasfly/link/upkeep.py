@@ -1,0 +1,127 @@
+"""What keeps a link alive beside the samples: time exchange, message rates, watching the heartbeat."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from uasfly.errors import LinkError
+from uasfly.link.bridge import Bridge
+from uasfly.link.commands import CommandChannel
+from uasfly.link.ports import check_available
+from uasfly.link.slots import Slot
+from uasfly.link.streams import ask_for_streams
+from uasfly.link.timesync import TimeSync
+from uasfly.link.urls import ConnectionUrl
+
+SILENCE_S = 3.0  # PX4 sends a heartbeat every second
+REOPEN_INTERVAL_S = 2.0
+WARNING, NOTICE = 4, 5  # MAVLink severities
+
+Say = Callable[[int, str], None]
+
+_log = logging.getLogger("uasfly.link")
+
+
+class Upkeep:
+    """Background tasks of a link.
+
+    Args:
+        bridge, url: the connection.
+        time_sync: the time exchange to drive.
+        commands: channel for the message intervals.
+        heartbeats: slot that the heartbeats go through.
+        want_truth: whether to ask for the true state too.
+        say: announces something to the pilot, with its MAVLink severity.
+    """
+
+    def __init__(
+        self,
+        bridge: Bridge,
+        url: ConnectionUrl,
+        time_sync: TimeSync,
+        commands: CommandChannel,
+        heartbeats: Slot,
+        want_truth: bool,
+        say: Say,
+    ) -> None:
+        self._bridge = bridge
+        self._url = url
+        self._time_sync = time_sync
+        self._commands = commands
+        self._heartbeats = heartbeats
+        self._want_truth = want_truth
+        self._say = say
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._stream_task: asyncio.Task[None] | None = None
+
+    def start(self) -> None:
+        """Start all tasks."""
+        self._spawn(self._keep_time())
+        self._spawn(self._watch_heartbeat())
+        self.ask_for_streams()
+
+    def ask_for_streams(self) -> None:
+        """Set the message intervals (again): a vehicle that has restarted has forgotten them."""
+        if self._stream_task is not None:
+            self._stream_task.cancel()
+        self._stream_task = self._spawn(self._stream())
+
+    async def streams_asked(self) -> None:
+        """Wait until the vehicle has been asked for all message intervals."""
+        if self._stream_task is not None:
+            await asyncio.wait((self._stream_task,))
+
+    def cancel(self) -> list[asyncio.Task[None]]:
+        """Stop all tasks; returns them, to be awaited."""
+        tasks = list(self._tasks)
+        for task in tasks:
+            task.cancel()
+        return tasks
+
+    def _spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    async def _stream(self) -> None:
+        for problem in await ask_for_streams(self._commands, self._want_truth):
+            self._say(WARNING, problem)
+
+    async def _keep_time(self) -> None:
+        while True:
+            self._bridge.send("TIMESYNC", self._time_sync.request(self._bridge.system_id, time.monotonic_ns()))
+            await asyncio.sleep(self._time_sync.interval_s)
+
+    async def _watch_heartbeat(self) -> None:
+        """Announce silence and its end; bring a serial port back."""
+        while True:
+            received = self._heartbeats.received
+            await asyncio.sleep(SILENCE_S)
+            if self._heartbeats.received != received:
+                continue
+            self._say(WARNING, f"no heartbeat from the vehicle for {SILENCE_S:g} s")
+            await self._until_heartbeat(received)
+            self._say(NOTICE, "the vehicle's heartbeat is back")
+            self.ask_for_streams()
+
+    async def _until_heartbeat(self, received: int) -> None:
+        since_reopening_s = 0.0
+        step_s = 0.1
+        while self._heartbeats.received == received:
+            if self._url.scheme == "serial" and since_reopening_s <= 0.0:
+                since_reopening_s = REOPEN_INTERVAL_S
+                self._reopen()
+            await asyncio.sleep(step_s)
+            since_reopening_s -= step_s
+
+    def _reopen(self) -> None:
+        try:
+            check_available(self._url)
+            self._bridge.reopen()
+        except LinkError as error:
+            _log.debug("%s", error)

@@ -1,0 +1,95 @@
+"""Telemetry of the raw sensors, field by field as PX4 fills it (main of August 2026)."""
+
+from __future__ import annotations
+
+import math
+
+from pymavlink.dialects.v20 import development as dialect
+
+from uasfly.frames import swap_enu_ned, swap_flu_frd
+from uasfly.sim.mavlink.framing import Message
+from uasfly.sim.mavlink.motion_messages import microseconds, milliseconds
+from uasfly.sim.mavlink.vehicle_view import VehicleView
+from uasfly.sim.sensors import GnssSample
+
+TEMPERATURE_C = 15.0
+GNSS_LOST_INTERVAL_S = 1.0
+# fields of HIGHRES_IMU that are new: accelerometer, gyro, magnetometer, barometer
+_FIELDS_UPDATED = 0x3F | 0x1C0 | 0x1A00
+_UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
+_EPH, _EPV = 70, 110  # dilution of precision times 100, and
+_VELOCITY_ACCURACY_MM_S = 400  # accuracy of PX4's simulated receiver
+
+
+def highres_imu(view: VehicleView) -> Message:
+    """HIGHRES_IMU."""
+    sample = view.vehicle.inertial()
+    return dialect.MAVLink_highres_imu_message(
+        microseconds(sample.time_s),
+        *swap_flu_frd(sample.acceleration_in_body).tolist(),
+        *swap_flu_frd(sample.angular_rate_in_body).tolist(),
+        *swap_flu_frd(sample.magnetic_field_in_body).tolist(),
+        pressure_of_altitude_hpa(sample.pressure_altitude_m),
+        0.0,
+        sample.pressure_altitude_m,
+        TEMPERATURE_C,
+        _FIELDS_UPDATED,
+        0,
+    )
+
+
+def scaled_pressure(view: VehicleView) -> Message:
+    """SCALED_PRESSURE."""
+    sample = view.vehicle.inertial()
+    pressure = pressure_of_altitude_hpa(sample.pressure_altitude_m)
+    return dialect.MAVLink_scaled_pressure_message(
+        milliseconds(sample.time_s), pressure, 0.0, round(TEMPERATURE_C * 100.0), 0
+    )
+
+
+class Gnss:
+    """GPS_RAW_INT: what the receiver says; without a fix an empty message once a second."""
+
+    def __init__(self) -> None:
+        self._sent_s = -math.inf
+
+    def __call__(self, view: VehicleView) -> Message | None:
+        """Build the message; None where a receiver without a fix has nothing to say yet."""
+        sample = view.vehicle.gnss()
+        if sample.fix == 0 and sample.time_s - self._sent_s < GNSS_LOST_INTERVAL_S:
+            return None
+        self._sent_s = sample.time_s
+        return _no_fix() if sample.fix == 0 else _fix(sample)
+
+
+def pressure_of_altitude_hpa(altitude_m: float) -> float:
+    """Air pressure in the ICAO standard atmosphere below 11 km."""
+    return 1013.25 * math.pow(max(0.0, 1.0 - 2.25577e-5 * altitude_m), 5.25588)
+
+
+def _fix(sample: GnssSample) -> Message:
+    v_north, v_east, v_down = swap_enu_ned(sample.velocity_in_world).tolist()
+    altitude_mm = round(sample.altitude_m * 1e3)
+    speed = math.sqrt(v_north * v_north + v_east * v_east + v_down * v_down)
+    return dialect.MAVLink_gps_raw_int_message(
+        microseconds(sample.time_s),
+        sample.fix,
+        round(sample.latitude_deg * 1e7),
+        round(sample.longitude_deg * 1e7),
+        altitude_mm,
+        _EPH,
+        _EPV,
+        min(_UNKNOWN_U16 - 1, int(speed * 100.0)),
+        int(math.degrees(math.atan2(v_east, v_north)) % 360.0 * 100.0) % 36000,
+        sample.satellites,
+        altitude_mm,
+        round(sample.horizontal_accuracy_m * 1e3),
+        round(sample.vertical_accuracy_m * 1e3),
+        _VELOCITY_ACCURACY_MM_S,
+    )
+
+
+def _no_fix() -> Message:
+    return dialect.MAVLink_gps_raw_int_message(
+        0, 0, 0, 0, 0, _UNKNOWN_U16, _UNKNOWN_U16, _UNKNOWN_U16, _UNKNOWN_U16, _UNKNOWN_U8
+    )

@@ -1,0 +1,164 @@
+"""The one form of all references: a table of pieces in time, each a cubic plus harmonics of a cubic phase.
+
+In a piece, with t from its start, position and phase theta are cubic polynomials of t (constant jerk), and
+
+    p = cubic(t) + a1 cos(theta) + b1 sin(theta) + a2 cos(2 theta) + b2 sin(2 theta).
+
+Straight motion needs the cubic alone, circles and spirals the first harmonic, eights the second. Velocity and
+acceleration are the exact derivatives. One table for a whole mission makes sampling a handful of array operations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uasfly.messages import Array
+
+CUBIC = slice(0, 3)  # columns of a polynomial: x, y, z [m]
+PHASE = 3  # [rad]
+COLUMNS = 4
+CHUNK = 4096  # times sampled at once
+HARMONICS = 4  # cos, sin, cos of twice, sin of twice the phase
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """n pieces, one after the other.
+
+    Attributes:
+        durations_s: (n,).
+        polynomials: (n, 4, 4) coefficients of t^0..t^3 (rows) of x, y, z [m] and phase [rad] (columns).
+        harmonics: (n, 4, 3) vectors [m] of cos, sin, cos of twice and sin of twice the phase.
+    """
+
+    durations_s: Array
+    polynomials: Array
+    harmonics: Array
+
+    @property
+    def duration_s(self) -> float:
+        """Duration of all pieces [s]."""
+        return float(self.durations_s.sum())
+
+
+def straight_pieces(durations_s: Sequence[float], start: Array, jerks: Array) -> Pieces:
+    """Pieces from rest at `start` (d,) under a constant jerk (n, d) each; d = 3 moves the position, d = 1 the phase."""
+    columns = CUBIC if start.size == 3 else slice(PHASE, PHASE + 1)
+    polynomials = np.zeros((len(durations_s), 4, COLUMNS))
+    position, velocity, acceleration = start.copy(), np.zeros_like(start), np.zeros_like(start)
+    for index, (t, jerk) in enumerate(zip(durations_s, jerks, strict=True)):
+        polynomials[index, :, columns] = position, velocity, acceleration / 2.0, jerk / 6.0
+        position = position + t * (velocity + t * (acceleration / 2.0 + t * jerk / 6.0))
+        velocity = velocity + t * (acceleration + t * jerk / 2.0)
+        acceleration = acceleration + t * jerk
+    return Pieces(np.array(durations_s, dtype=float), polynomials, np.zeros((len(durations_s), HARMONICS, 3)))
+
+
+def rest(position: Array, duration_s: float) -> Pieces:
+    """Stand at a point (3,) [m]."""
+    return straight_pieces([duration_s], position, np.zeros((1, 3)))
+
+
+def concatenate(parts: Sequence[Pieces]) -> Pieces:
+    """All parts, one after the other; pieces without duration are left out."""
+    durations = np.concatenate([part.durations_s for part in parts])
+    keep = durations > 0.0
+    return Pieces(
+        durations[keep],
+        np.concatenate([part.polynomials for part in parts])[keep],
+        np.concatenate([part.harmonics for part in parts])[keep],
+    )
+
+
+class PieceTable:
+    """Samples pieces at many times at once.
+
+    Args:
+        pieces: the pieces; the last one should end at rest, for it holds its end afterwards.
+        offset: (3,) [m] added to every position.
+    """
+
+    def __init__(self, pieces: Pieces, offset: Array | None = None) -> None:
+        self._pieces = pieces
+        ends = np.cumsum(pieces.durations_s)
+        self.duration_s = float(ends[-1]) if ends.size else 0.0
+        self._starts = np.concatenate(([0.0], ends[:-1]))
+        polynomials = pieces.polynomials.copy()
+        if offset is not None:
+            polynomials[:, 0, CUBIC] += offset
+        self._derivatives = _polynomials_and_derivatives(polynomials)
+        distinct, groups = np.unique(pieces.harmonics.reshape(-1, HARMONICS * 3), axis=0, return_inverse=True)
+        self._groups: NDArray[np.intp] = groups.reshape(-1)  # pieces of one leg share their harmonics
+        self._curved = [bool(vectors.any()) for vectors in distinct]
+        self._vectors = _vectors_and_derivatives(distinct.reshape(-1, HARMONICS, 3))
+
+    def sample_long(self, times_s: Array) -> tuple[Array, Array, Array]:
+        """The same as `sample` in bounded memory, for very many times."""
+        chunks = [self.sample(times_s[first : first + CHUNK]) for first in range(0, max(len(times_s), 1), CHUNK)]
+        position, velocity, acceleration = (np.concatenate(arrays) for arrays in zip(*chunks, strict=True))
+        return position, velocity, acceleration
+
+    def sample(self, times_s: Array) -> tuple[Array, Array, Array]:
+        """Position [m], velocity [m/s] and acceleration [m/s^2], each (n, 3), at (n,) times [s], which are clamped."""
+        times = np.minimum(np.maximum(times_s, 0.0), self.duration_s)
+        index = self._starts.searchsorted(times, "right") - 1
+        t = times - self._starts.take(index)
+        powers = np.ones((t.size, 1, 4))
+        square = t * t
+        powers[:, 0, 1] = t
+        powers[:, 0, 2] = square
+        powers[:, 0, 3] = square * t
+        motion = (powers @ self._derivatives.take(index, axis=0))[:, 0]
+        position, velocity, acceleration = motion[:, 0:3], motion[:, 3:6], motion[:, 6:9]
+        groups = self._groups.take(index)
+        group = int(groups[0]) if t.size else 0
+        same = not np.count_nonzero(groups - group)
+        if same and not self._curved[group]:
+            return position.copy(), velocity.copy(), acceleration.copy()
+        scaled = _scaled_harmonics(motion[:, 9:])
+        if same:
+            curved = motion[:, :9] + scaled @ self._vectors[group]
+        else:
+            curved = motion[:, :9] + (scaled[:, None, :] @ self._vectors.take(groups, axis=0))[:, 0]
+        return curved[:, 0:3].copy(), curved[:, 3:6].copy(), curved[:, 6:9].copy()
+
+
+def _scaled_harmonics(phase: Array) -> Array:
+    """Harmonics (4) times 1, rate, acceleration and squared rate (n, 16) of phase, its rate and acceleration (n, 3)."""
+    turned = np.exp(1j * phase[:, 0])
+    harmonics = np.empty((len(phase), HARMONICS // 2), dtype=complex)
+    harmonics[:, 0] = turned
+    harmonics[:, 1] = turned * turned
+    factors = np.ones((len(phase), 4, 1))
+    factors[:, 1:3, 0] = phase[:, 1:]
+    factors[:, 3, 0] = phase[:, 1] * phase[:, 1]
+    scaled: Array = factors * harmonics.view(float)[:, None, :]
+    return scaled.reshape(-1, 4 * HARMONICS)
+
+
+def _polynomials_and_derivatives(polynomials: Array) -> Array:
+    """Coefficients (n, 4, 12): position, velocity, acceleration (x, y, z each), phase, its rate and acceleration."""
+    first, second = np.zeros_like(polynomials), np.zeros_like(polynomials)
+    first[:, :3] = polynomials[:, 1:] * np.array((1.0, 2.0, 3.0))[:, None]
+    second[:, :3] = first[:, 1:] * np.array((1.0, 2.0, 3.0))[:, None]
+    orders = (polynomials, first, second)
+    return np.concatenate([*(c[:, :, CUBIC] for c in orders), *(c[:, :, PHASE:] for c in orders)], axis=2)
+
+
+def _vectors_and_derivatives(vectors: Array) -> Array:
+    """What turns `_scaled_harmonics` into position, velocity and acceleration: (n, 16, 9), from vectors (n, 4, 3).
+
+    With u(theta) the harmonic part of the path: u, u' theta' and u' theta'' + u'' theta'^2.
+    """
+    order = np.array((1.0, 1.0, 2.0, 2.0))[:, None]
+    slope = order * vectors[:, (1, 0, 3, 2)] * np.array((1.0, -1.0, 1.0, -1.0))[:, None]
+    result = np.zeros((len(vectors), 4, HARMONICS, 9))
+    result[:, 0, :, 0:3] = vectors
+    result[:, 1, :, 3:6] = slope
+    result[:, 2, :, 6:9] = slope
+    result[:, 3, :, 6:9] = -(order**2) * vectors
+    return result.reshape(-1, 4 * HARMONICS, 9)
