@@ -58,7 +58,7 @@ class MarkerSample:
         marker_id: which marker or bundle.
         position_in_body: (3,) m, marker origin seen from the body origin.
         quaternion_marker_to_body: (4,).
-        covariance: (6, 6) of position [m^2] and small-angle rotation [rad^2].
+        covariance: (6, 6) of position [m^2, body axes] and rotation [rad^2, marker axes: true = measured * exp(error)].
     """
 
     time_s: float

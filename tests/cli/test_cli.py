@@ -79,7 +79,9 @@ def test_no_vehicle_is_said_after_the_time_out() -> None:
 def test_check_names_file_line_and_field(tmp_path: Path) -> None:
     """A wrong mission is told with its line and field, as text and as JSON."""
     path = tmp_path / "wrong.yaml"
-    path.write_text("name: wrong\ntakeoff: {height_m: 1.5}\nlegs:\n  - {type: hover, position_m: [0, 0], duration_s: 5}\n")
+    path.write_text(
+        "name: wrong\ntakeoff: {height_m: 1.5}\nlegs:\n  - {type: hover, position_m: [0, 0], duration_s: 5}\n"
+    )
     result = _run("check", str(path), "--json")
     assert result.returncode == 2
     (finding,) = json.loads(result.stdout)
@@ -123,7 +125,7 @@ def test_rehearse_prints_and_writes_its_summary(tmp_path: Path) -> None:
 
 def test_an_aborted_flight_exits_with_1() -> None:
     """A vehicle that will not arm: aborted, the summary says why."""
-    result = _run("rehearse", "hover", "--set", "scenario.sensors.position_noise_m=5", "--json", timeout_s=300.0)
+    result = _run("rehearse", "hover", "--set", "scenario.sensors.velocity_noise_m_s=5", "--json", timeout_s=300.0)
     assert result.returncode == 1, result.stderr
     assert json.loads(result.stdout)["outcome"] == "aborted"
     assert json.loads(result.stdout)["reason"]

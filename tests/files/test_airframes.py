@@ -36,19 +36,16 @@ def test_file_and_airframe_have_one_name_and_a_plant(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "hover", "weights"),
+    ("name", "hover"),
     [
-        ("f550", 0.3436, ((25, 25, 17), (11, 11, 11), 135, 135, 750)),
-        ("aurelia_x6", 0.3012, ((21, 21, 17), (15, 15, 13), 250, 250, 750)),
-        ("iris", 0.7081, ((20, 20, 20), (5, 5, 5), 100, 100, 100)),
+        ("f550", 0.3436),
+        ("aurelia_x6", 0.3012),
+        ("iris", 0.7081),
     ],
 )
-def test_the_papers_airframes_hover_where_the_paper_says(name, hover, weights):
-    """Model and weights are the paper's."""
-    frame = airframe(name)
-    cost = frame.controller.weights
-    assert frame.model.hover_thrust == pytest.approx(hover, abs=1e-4)
-    assert (cost.position, cost.velocity, cost.roll, cost.pitch, cost.thrust) == weights
+def test_the_papers_airframes_hover_where_the_paper_says(name, hover):
+    """k_thrust is the paper's."""
+    assert airframe(name).model.hover_thrust == pytest.approx(hover, abs=1e-4)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -71,7 +68,7 @@ def test_the_f550_holds_the_strongest_jet_in_all_directions():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_backup_pids_are_stable_with_the_airframes_lag_and_delay(name):
-    """The loop gain crosses one once, 35 degrees and 9 dB are spare; 30 ms are added for estimation."""
+    """The loop gain crosses one once, 45 degrees and 10 dB are spare; 30 ms are added for estimation."""
     frame = airframe(name)
     s = 1j * np.logspace(-3, 2, 50_000)
     for gains, lag, delay in (
@@ -80,9 +77,9 @@ def test_the_backup_pids_are_stable_with_the_airframes_lag_and_delay(name):
     ):
         loop = (gains.kd * s + gains.kp + gains.ki / s) * np.exp(-delay * s) / (s**2 * (lag * s + 1.0))
         (crossing,) = np.flatnonzero((np.abs(loop[:-1]) >= 1.0) & (np.abs(loop[1:]) < 1.0))
-        assert math.degrees(np.angle(-loop[crossing])) > 35.0
+        assert math.degrees(np.angle(-loop[crossing])) > 45.0
         turned = np.flatnonzero((np.diff(np.sign(loop.imag)) != 0) & (loop.real[:-1] < 0) & (np.abs(loop[:-1]) < 1.0))
-        assert np.abs(loop[turned[0]]) < 10 ** (-9 / 20)
+        assert np.abs(loop[turned[0]]) < 10 ** (-10 / 20)
 
 
 def test_an_airframe_that_cannot_hold_its_wind_is_told():

@@ -181,12 +181,12 @@ def test_refused_offboard_is_asked_again_and_then_given_up() -> None:
 
 
 def test_an_uncertain_estimate_does_not_take_off() -> None:
-    """A position sigma of 2 m is not ready to fly; after the time-out the reason says so."""
+    """A velocity sigma of 2 m/s is not ready to fly; after the time-out the reason says so."""
     script = _script()
     script.sigma_m = 2.0
     script.run(35.0)
     assert script.sequencer.phase is Phase.ABORTED
-    assert "position sigma 2.00 m" in script.sequencer.reason
+    assert "velocity is known to 2.00 m/s" in script.sequencer.reason
     assert script.asked == []
 
 

@@ -31,12 +31,14 @@ def rehearse(
     """
     from uasfly.cli.output import check_writable, finish
     from uasfly.cli.progress import RehearsalProgress
+    from uasfly.drivers.checking import refuse_infeasible
     from uasfly.drivers.plan import load_plan
     from uasfly.drivers.rehearse import rehearse as run
 
     check_writable(log, "flight log")
     check_writable(summary, "summary")
     plan = load_plan(mission, airframe, controller=controller, seed=seed, scenario=scenario, settings=settings)
+    refuse_infeasible(plan.mission, plan.airframe, lambda text: typer.echo(text, err=True))
     with RehearsalProgress(plan.mission.name) as progress:
         result = run(plan, log, progress.update)
     raise typer.Exit(finish(result, summary, as_json=as_json))

@@ -13,7 +13,7 @@ from uasfly.files import Kind, find_file, load_file, top_level_fields, write_sch
 from uasfly.mission import Mission
 from uasfly.sim.plant import Plant
 from uasfly.sim.scenario import Scenario
-from uasfly.trajectories.feasibility import check_mission
+from uasfly.trajectories.feasibility import check_airframe, check_mission
 
 MODELS: dict[Kind, type[Any]] = {
     "mission": Mission,
@@ -69,6 +69,11 @@ def check_files(files: list[str], airframe_name: str) -> list[CheckFinding]:
             found = [
                 CheckFinding(str(path), finding.severity, f"{finding.field}: {finding.text}")
                 for finding in check_mission(loaded, airframe)
+            ]
+        elif isinstance(loaded, Airframe):
+            found = [
+                CheckFinding(str(path), finding.severity, f"{finding.field}: {finding.text}")
+                for finding in check_airframe(loaded)
             ]
         findings += found or [CheckFinding(str(path), "ok", f"a {kind}")]
     return findings

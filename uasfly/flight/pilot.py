@@ -20,6 +20,7 @@ from uasfly.mission import Mission
 from uasfly.observer.observer import Observer
 from uasfly.trajectories.hold import HoldTrajectory
 from uasfly.trajectories.mission_trajectory import MissionTrajectory
+from uasfly.trajectories.trajectory import TrajectoryError
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,8 @@ class Pilot:
         self.sequencer = Sequencer(engage, mission.takeoff.height_m, EndingAction(mission.ending.action))
         self.monitors = Monitors(mission.limits)
         self._origin: Array | None = None
-        self._trajectory: MissionTrajectory | None = None
+        self._planned: MissionTrajectory | None = None  # starts where the vehicle holds while it engages
+        self._trajectory: MissionTrajectory | None = None  # the planned one, once the legs fly
         self._legs_start_s = 0.0
         self._leg_started = False
         self._hold: HoldTrajectory | None = None
@@ -128,6 +130,22 @@ class Pilot:
         """Hold where the vehicle is; the first setpoint continues what the vehicle was being told."""
         _, _, yaw = euler_from_quaternion(estimate.quaternion_body_to_world)
         self._hold = HoldTrajectory(estimate.position_in_world, yaw)
+        self._reset_controller(time_s)
+        assert self._origin is not None
+        try:
+            # Some tens of milliseconds of work, so it is done now, while PX4 still flies the vehicle by itself.
+            self._planned = MissionTrajectory(
+                self.mission,
+                self.airframe.limits,
+                start_position=self._hold.position_in_world,
+                start_yaw=self._hold.yaw_rad,
+                takeoff_in_world=self._origin,
+            )
+        except TrajectoryError as error:
+            self.sequencer.end(time_s, f"the mission cannot be flown from here: {error}")
+
+    def _reset_controller(self, time_s: float) -> None:
+        """Let the controller start from what the vehicle was last being told."""
         target = self.view.attitude_target
         last = None
         if target is not None:
@@ -141,15 +159,9 @@ class Pilot:
             return
         if phase is Phase.TAKEOFF or (phase is Phase.ENGAGE and self._origin is None):
             self._origin = self._origin_of(estimate, on_ground=phase is Phase.TAKEOFF)
-        elif phase is Phase.LEGS and self._hold is not None and self._origin is not None:
-            self._trajectory = MissionTrajectory(
-                self.mission,
-                self.airframe.limits,
-                start_position=self._hold.position_in_world,
-                start_yaw=self._hold.yaw_rad,
-                takeoff_in_world=self._origin,
-            )
-            self._legs_start_s = time_s
+        elif phase is Phase.LEGS:
+            self._trajectory, self._legs_start_s = self._planned, time_s
+            self._reset_controller(time_s)  # until now PX4 flew: what was sent did not act, nor may it be integrated
 
     def _origin_of(self, estimate: StateEstimate, *, on_ground: bool) -> Array:
         if self.mission.frame == "local":

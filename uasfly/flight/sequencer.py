@@ -21,7 +21,8 @@ ANSWER_TIMEOUT_S = 5.0
 LANDING_TIMEOUT_S = 240.0
 STALE_S = 0.5  # older odometry than this stops the setpoints; PX4's own failsafe acts after COM_OF_LOSS_T
 LOST_S = 5.0
-POSITION_SIGMA_READY_M = 0.5
+VELOCITY_SIGMA_READY_M_S = 0.2
+POSITION_SIGMA_READY_M = 5.0  # GNSS drifts unseen while the vehicle waits on the ground, so this one cannot be tight
 HEARTBEAT_GRACE_S = 1.5  # a heartbeat that tells the old mode may still be on its way after an accepted change
 DISCONNECT_S = 15.0
 
@@ -157,14 +158,14 @@ class Sequencer:
     ) -> None:
         ready = (
             estimate is not None
+            and float(estimate.velocity_sigma_m_s.max()) < VELOCITY_SIGMA_READY_M_S
             and float(estimate.position_sigma_m.max()) < POSITION_SIGMA_READY_M
             and (view.health is None or (view.health.attitude_ok and view.health.velocity_ok))
         )
         if not ready:
             self._ready_since_s = None
             if time_s - self._entered_s > PREFLIGHT_TIMEOUT_S:
-                sigma = float("nan") if estimate is None else float(estimate.position_sigma_m.max())
-                self._abort(time_s, f"not ready to fly after {PREFLIGHT_TIMEOUT_S:.0f} s: position sigma {sigma:.2f} m")
+                self._abort(time_s, f"not ready to fly after {PREFLIGHT_TIMEOUT_S:.0f} s: {_unready(view, estimate)}")
             return
         if self._ready_since_s is None:
             self._ready_since_s = time_s
@@ -282,3 +283,13 @@ class Sequencer:
         self._enter(time_s, Phase.ABORTED)
         self.reason = self._abort_reason or reason
         self.announcements.append((3, f"aborted: {reason}"))
+
+
+def _unready(view: VehicleView, estimate: StateEstimate | None) -> str:
+    """Why the vehicle is not ready, for the pilot."""
+    if view.health is not None and not (view.health.attitude_ok and view.health.velocity_ok):
+        return "PX4's estimator reports no attitude or velocity"
+    if estimate is None:
+        return "no estimate"
+    velocity, position = float(estimate.velocity_sigma_m_s.max()), float(estimate.position_sigma_m.max())
+    return f"velocity is known to {velocity:.2f} m/s, position to {position:.2f} m"

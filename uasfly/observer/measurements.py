@@ -1,0 +1,91 @@
+"""The measurements, symbolically, and their Jacobians (Kalaitzakis & Vitzilaios 2023, eq. 6 and 7)."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from uasfly.model import quaternion_product, rotation_from_quaternion
+from uasfly.observer import states as s
+from uasfly.observer.error_state import (
+    along_manifold,
+    at_zero,
+    conjugate,
+    difference_between,
+    logarithm,
+    pose_difference,
+    retract,
+    retract_pose,
+)
+
+
+def measure_position(core: ca.SX) -> ca.SX:
+    """Position (3,) as GNSS gives it: y1a = p + b (eq. 6)."""
+    return core[s.POSITION] + core[s.BIAS]
+
+
+def measure_velocity(core: ca.SX) -> ca.SX:
+    """Velocity (3,) as PX4 gives it.
+
+    Eq. 6 has y2 = R' v, for a sensor on the body. PX4's velocity is its filter's, kept and corrected by GNSS in world
+    axes: turning it into the body with the measured attitude would only add that attitude's error, correlated with y1b.
+    """
+    return core[s.VELOCITY]
+
+
+def attitude_innovation(core: ca.SX, measured: ca.SX) -> ca.SX:
+    """Innovation (3,) [rad] of a measured quaternion: log(q^-1 y1b), body axes (eq. 6)."""
+    return logarithm(quaternion_product(conjugate(core[s.QUATERNION]), measured))
+
+
+def odometry_jacobian(core: ca.SX, sensor: int) -> ca.SX:
+    """Derivative (3, 15) of a sensor's measurement with respect to the error; `sensor` indexes SENSORS."""
+    if sensor == s.ATTITUDE_SENSOR:
+        return along_manifold(lambda start, error: difference_between(start, retract(start, error)), core)[
+            s.D_ATTITUDE, :
+        ]
+    error = ca.SX.sym("error", s.CORE_ERROR)
+    moved = retract(core, error)
+    return at_zero(measure_position(moved) if sensor == s.POSITION_SENSOR else measure_velocity(moved), error)
+
+
+def measure_marker(core: ca.SX, marker: ca.SX) -> ca.SX:
+    """Pose (7,) of a marker relative to the body: y3a = R' (p_M - p), y3b = q^-1 q_M (eq. 7)."""
+    rotation = rotation_from_quaternion(core[s.QUATERNION])
+    return ca.vertcat(
+        ca.mtimes(rotation.T, marker[:3] - core[s.POSITION]),
+        quaternion_product(conjugate(core[s.QUATERNION]), marker[3:]),
+    )
+
+
+def locate_marker(core: ca.SX, relative: ca.SX) -> ca.SX:
+    """Pose (7,) in the world of a marker seen at `relative` (7,): the inverse of eq. 7, for its first sight."""
+    rotation = rotation_from_quaternion(core[s.QUATERNION])
+    return ca.vertcat(
+        core[s.POSITION] + ca.mtimes(rotation, relative[:3]),
+        quaternion_product(core[s.QUATERNION], relative[3:]),
+    )
+
+
+def marker_innovation(core: ca.SX, marker: ca.SX, relative: ca.SX) -> ca.SX:
+    """Innovation (6,) of a marker sighting: position [m, body axes] and rotation [rad, marker axes] (eq. 7)."""
+    expected = measure_marker(core, marker)
+    turn = quaternion_product(conjugate(expected[3:]), relative[3:])
+    return ca.vertcat(relative[:3] - expected[:3], logarithm(turn))
+
+
+def marker_jacobians(core: ca.SX, marker: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Derivatives (6, 15) and (6, 6) of eq. 7 with respect to the core's and to the marker's error."""
+    core_error, marker_error = ca.SX.sym("core_error", s.CORE_ERROR), ca.SX.sym("marker_error", s.MARKER_ERROR)
+    expected = measure_marker(core, marker)
+    by_core = pose_difference(expected, measure_marker(retract(core, core_error), marker))
+    by_marker = pose_difference(expected, measure_marker(core, retract_pose(marker, marker_error)))
+    return at_zero(by_core, core_error), at_zero(by_marker, marker_error)
+
+
+def locating_jacobians(core: ca.SX, relative: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Derivatives (6, 15) and (6, 6) of `locate_marker` with respect to the core's error and to the sighting's."""
+    core_error, noise = ca.SX.sym("core_error", s.CORE_ERROR), ca.SX.sym("noise", s.MARKER_ERROR)
+    located = locate_marker(core, relative)
+    by_core = pose_difference(located, locate_marker(retract(core, core_error), relative))
+    by_noise = pose_difference(located, locate_marker(core, retract_pose(relative, noise)))
+    return at_zero(by_core, core_error), at_zero(by_noise, noise)

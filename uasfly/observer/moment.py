@@ -1,0 +1,53 @@
+"""What the filter knows at one time, and what its gates said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from uasfly.messages import Array
+from uasfly.observer import states as s
+from uasfly.observer.door import Odometry, Sighting
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """The filter at one time, after the measurement of that time.
+
+    Attributes:
+        time_s: the time.
+        packed: state, see states.Layout.
+        markers: ids of the markers in the state, in their order there.
+        scales: factors on the sightings' covariances, one a marker.
+        airborne: whether the prediction up to here was of flight.
+        rate: (3,) rad/s, body, last measured.
+        rate_s: when it was measured.
+        odometry_s: last odometry sample.
+        sighted_s: last accepted sighting of each marker.
+        measured: what was measured here; None for a mere prediction.
+    """
+
+    time_s: float
+    packed: Array
+    markers: tuple[int, ...]
+    scales: tuple[float, ...]
+    airborne: bool
+    rate: tuple[float, ...]
+    rate_s: float
+    odometry_s: float
+    sighted_s: tuple[float, ...]
+    measured: Odometry | Sighting | None
+
+    @property
+    def layout(self) -> s.Layout:
+        """How `packed` is laid out."""
+        return s.Layout(len(self.markers))
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What the gate said of one sensor: normalised innovation squared, degrees of freedom, accepted or not."""
+
+    sensor: str
+    nis: float
+    dof: int
+    accepted: bool

@@ -1,0 +1,231 @@
+"""The error-state Kalman filter as the flight sees it: samples in at their own times, an estimate out at any time.
+
+Kalaitzakis & Vitzilaios 2023, section 2.3, with the measurements put where they belong in time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from uasfly.airframe import Airframe
+from uasfly.messages import (
+    Array,
+    AttitudeTargetSample,
+    MarkerSample,
+    OdometrySample,
+    Sample,
+    Setpoint,
+    StateEstimate,
+    VehicleSample,
+)
+from uasfly.observer import states as s
+from uasfly.observer.door import Odometry, Sighting, checked_odometry, checked_sighting
+from uasfly.observer.moment import Moment, Verdict
+from uasfly.observer.step import Stepper, hover_thrust_history
+from uasfly.observer.timeline import Timeline
+
+OWN_COMMAND_S = 0.5  # for this long after a command of ours in offboard, PX4's attitude target is only its echo
+SILENT_AFTER_S = 0.15  # without odometry for this long estimates are predicted with their uncertainty,
+TICK_BEHIND_S = 0.1  # and the filter itself to this long before now
+JUMP_AHEAD_S = 1.0  # a sample further ahead of the filter than this needs a second one to be believed
+LONGEST_GAP_S = 5.0  # a longer gap is not bridged: the filter starts again
+RESTART_AFTER_S = 1.0  # samples that are all too old for this long: the clock was set back, start again
+
+
+@dataclass(slots=True)
+class Counters:
+    """What the observer refused, since it was made.
+
+    Attributes:
+        rejected: measurements outside their gate, by sensor.
+        late: put back in time. dropped: too old for the buffer. duplicates: sensor and time already there.
+        ahead: alone far ahead in time. non_finite: samples or parts of samples with unusable numbers.
+        restarts: times the filter started again after a gap or a clock that was set back.
+    """
+
+    rejected: dict[str, int] = field(default_factory=lambda: dict.fromkeys((*s.SENSORS, s.MARKER_SENSOR), 0))
+    late: int = 0
+    dropped: int = 0
+    duplicates: int = 0
+    ahead: int = 0
+    non_finite: int = 0
+    restarts: int = 0
+
+
+class Observer:
+    """Estimates position, velocity, attitude, wind force, GNSS bias and marker poses.
+
+    The filter stands at the newest measurement; `estimate` extrapolates from there by the model alone, which costs next
+    to nothing. A measurement that comes late is put in where it belongs and the filter runs again from there.
+
+    Args:
+        airframe: model and noise.
+        prepared_markers: for how many markers the functions are generated at once; more are generated in flight when
+            seen, which takes some tenths of a second each.
+    """
+
+    def __init__(self, airframe: Airframe, prepared_markers: int = 0) -> None:
+        self.counters = Counters()
+        self.statistics: dict[str, tuple[float, int]] = {}  # sensor: last normalised innovation squared, its dof
+        self._thrust = hover_thrust_history(airframe)
+        self._stepper = Stepper(airframe, self._thrust)
+        for markers in range(1, prepared_markers + 1):
+            self._stepper.prepare(markers)
+        self._k_thrust_m_s2 = airframe.model.k_thrust_m_s2
+        self._timeline: Timeline | None = None
+        self._in_air = False
+        self._in_air_s = -math.inf
+        self._own_command_s = -math.inf
+        self._ahead_s: float | None = None
+        self._dropped_from_s: float | None = None
+
+    def add(self, sample: Sample) -> None:
+        """Take in a sample, whenever it comes; kinds that say nothing about the state are ignored."""
+        if isinstance(sample, OdometrySample):
+            odometry = checked_odometry(sample)
+            if odometry is None or not odometry.complete:
+                self.counters.non_finite += 1
+            if odometry is not None:
+                self._measure(odometry)
+        elif isinstance(sample, MarkerSample):
+            sighting = checked_sighting(sample)
+            if sighting is None:
+                self.counters.non_finite += 1
+            else:
+                self._measure(sighting)
+        elif isinstance(sample, AttitudeTargetSample):
+            if abs(sample.time_s - self._own_command_s) > OWN_COMMAND_S:
+                self._command(sample.time_s, sample.thrust)
+        elif isinstance(sample, VehicleSample):
+            if not math.isfinite(sample.time_s):
+                self.counters.non_finite += 1
+            elif sample.time_s >= self._in_air_s:
+                self._in_air, self._in_air_s = sample.in_air, sample.time_s
+
+    def sent(self, setpoint: Setpoint, in_offboard: bool) -> None:
+        """A setpoint left at its `time_s`; it drives the model only while PX4 follows it (`in_offboard`)."""
+        if in_offboard and self._command(setpoint.time_s, setpoint.thrust):
+            self._own_command_s = setpoint.time_s
+
+    def set_k_thrust(self, k_thrust_m_s2: float) -> None:
+        """Thrust acceleration at full thrust [m/s^2], for commands from now on (it falls with the battery)."""
+        if math.isfinite(k_thrust_m_s2) and k_thrust_m_s2 > 0.0:
+            self._k_thrust_m_s2 = k_thrust_m_s2
+        else:
+            self.counters.non_finite += 1
+
+    def estimate(self, time_s: float) -> StateEstimate | None:
+        """State at `time_s`; the sigmas are those of the newest measurement, or of `time_s` after SILENT_AFTER_S.
+
+        Returns:
+            None before the first odometry sample, and where the filter stands more than LONGEST_GAP_S back.
+        """
+        timeline = self._timeline
+        if timeline is None or not time_s - timeline.newest.time_s < LONGEST_GAP_S:
+            return None
+        if time_s - timeline.newest.odometry_s > SILENT_AFTER_S:
+            if time_s - timeline.newest.time_s > SILENT_AFTER_S:
+                timeline.append(time_s - TICK_BEHIND_S, None, self._in_air)
+            moment, _ = self._stepper.advance(timeline.newest, time_s, None, self._in_air)
+            core = moment.packed[: s.CORE_NOMINAL]
+        else:
+            moment = timeline.at(time_s)
+            core = self._stepper.extrapolated(moment, max(time_s, moment.time_s))
+        layout = moment.layout
+        diagonal = slice(layout.covariance.start, layout.covariance.stop, layout.errors + 1)
+        sigmas = np.sqrt(moment.packed[diagonal])
+        return StateEstimate(
+            time_s=time_s,
+            position_in_world=core[s.POSITION],
+            velocity_in_world=core[s.VELOCITY],
+            quaternion_body_to_world=core[s.QUATERNION],
+            angular_rate_in_body=np.array(moment.rate),
+            force_in_world=core[s.FORCE],
+            gnss_bias_in_world=core[s.BIAS],
+            position_sigma_m=sigmas[s.D_POSITION],
+            velocity_sigma_m_s=sigmas[s.D_VELOCITY],
+            force_sigma_m_s2=sigmas[s.D_FORCE],
+        )
+
+    @property
+    def moment(self) -> Moment | None:
+        """The filter where it stands (nominal state, markers, time); None before the first odometry sample."""
+        return self._timeline.newest if self._timeline else None
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (n, n) of the error state (states.D_*, then six a marker) where the filter stands.
+
+        Raises:
+            LookupError: before the first odometry sample.
+        """
+        moment = self.moment
+        if moment is None:
+            raise LookupError("the observer has no covariance before the first odometry sample")
+        return moment.packed[moment.layout.covariance].reshape(moment.layout.errors, -1).copy()
+
+    def _command(self, time_s: float, thrust: float) -> bool:
+        if not (math.isfinite(time_s) and math.isfinite(thrust)):
+            self.counters.non_finite += 1
+            return False
+        self._thrust.add(time_s, self._k_thrust_m_s2 * min(max(thrust, 0.0), 1.0))
+        return True
+
+    def _measure(self, measured: Odometry | Sighting) -> None:
+        """Put a measurement in its place in time."""
+        timeline = self._timeline
+        if timeline is None:
+            self._start(measured)
+            return
+        time_s, newest_s = measured.time_s, timeline.newest.time_s
+        if time_s > newest_s + JUMP_AHEAD_S and not self._is_confirmed(measured):
+            return
+        self._ahead_s = None
+        if time_s - newest_s > LONGEST_GAP_S:
+            self._restart(measured)
+        elif time_s < timeline.oldest.time_s:
+            self._drop(measured)
+        elif timeline.holds(measured):
+            self.counters.duplicates += 1
+        else:
+            self._dropped_from_s = None
+            if time_s >= newest_s:
+                self._note(timeline.append(time_s, measured, self._in_air))
+            else:
+                self.counters.late += 1
+                self._note(timeline.insert(measured))
+
+    def _is_confirmed(self, measured: Odometry | Sighting) -> bool:
+        """Whether a sample far ahead is believed: one alone is a wrong time stamp, a second soon after confirms it."""
+        if self._ahead_s is not None and 0.0 < measured.time_s - self._ahead_s < JUMP_AHEAD_S:
+            return True
+        self._ahead_s = measured.time_s
+        self.counters.ahead += 1
+        return False
+
+    def _drop(self, measured: Odometry | Sighting) -> None:
+        """A sample older than the buffer; when nothing else comes for a while, the clock was set back."""
+        self.counters.dropped += 1
+        if self._dropped_from_s is None or measured.time_s < self._dropped_from_s:
+            self._dropped_from_s = measured.time_s
+        elif measured.time_s - self._dropped_from_s > RESTART_AFTER_S:
+            self._restart(measured)
+
+    def _start(self, measured: Odometry | Sighting) -> None:
+        if isinstance(measured, Odometry) and measured.complete:
+            self._timeline = Timeline(self._stepper, self._stepper.start(measured, self._in_air))
+            self._ahead_s = self._dropped_from_s = None
+
+    def _restart(self, measured: Odometry | Sighting) -> None:
+        if isinstance(measured, Odometry) and measured.complete:
+            self.counters.restarts += 1
+            self._start(measured)
+
+    def _note(self, verdicts: tuple[Verdict, ...]) -> None:
+        for verdict in verdicts:
+            self.statistics[verdict.sensor] = (verdict.nis, verdict.dof)
+            if not verdict.accepted:
+                self.counters.rejected[verdict.sensor] += 1

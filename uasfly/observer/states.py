@@ -1,0 +1,129 @@
+"""What the filter's vectors hold: nominal state, error state, and the packed vectors of the generated functions.
+
+The nominal state is Kalaitzakis & Vitzilaios 2023, section 2.3: p v q F b and one pose p_M q_M a marker.
+The error is local (body side) in every rotation: q = q_nominal * exp(d_attitude); the other parts add up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+# Nominal state.
+POSITION = slice(0, 3)  # m, world
+VELOCITY = slice(3, 6)  # m/s, world
+QUATERNION = slice(6, 10)  # body to world
+FORCE = slice(10, 13)  # m/s^2, world, mass-normalised
+BIAS = slice(13, 16)  # m, world: measured minus true position
+CORE_NOMINAL = 16
+MARKER_NOMINAL = 7  # p_M (m, world), q_M (marker to world)
+
+# Error state.
+D_POSITION = slice(0, 3)  # m
+D_VELOCITY = slice(3, 6)  # m/s
+D_ATTITUDE = slice(6, 9)  # rad, body
+D_FORCE = slice(9, 12)  # m/s^2
+D_BIAS = slice(12, 15)  # m
+CORE_ERROR = 15
+MARKER_ERROR = 6  # position (m, world), rotation (rad, marker frame)
+
+# Sensors inside an odometry sample, in the order in which they are used; each has three degrees of freedom.
+SENSORS = ("attitude", "position", "velocity")
+ATTITUDE_SENSOR, POSITION_SENSOR, VELOCITY_SENSOR = range(3)
+SENSOR_DOF = 3
+MARKER_SENSOR = "marker"
+MARKER_DOF = 6
+
+
+def marker_nominal(index: int) -> slice:
+    """Where the pose of marker `index` (0, 1, ...) lies in the nominal state."""
+    start = CORE_NOMINAL + MARKER_NOMINAL * index
+    return slice(start, start + MARKER_NOMINAL)
+
+
+def marker_error(index: int) -> slice:
+    """Where the error of marker `index` lies in the error state."""
+    start = CORE_ERROR + MARKER_ERROR * index
+    return slice(start, start + MARKER_ERROR)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The packed filter state of `markers` markers: all that one step of the filter hands to the next.
+
+    Nominal state, covariance (symmetric, n x n), matched measurement covariances (three 3 x 3, in the order of
+    SENSORS), mean innovations (three of 3).
+    """
+
+    markers: int
+
+    @property
+    def nominal_size(self) -> int:
+        """Length of the nominal state."""
+        return CORE_NOMINAL + MARKER_NOMINAL * self.markers
+
+    @property
+    def errors(self) -> int:
+        """Length n of the error state."""
+        return CORE_ERROR + MARKER_ERROR * self.markers
+
+    @property
+    def nominal(self) -> slice:
+        """The nominal state."""
+        return slice(0, self.nominal_size)
+
+    @property
+    def covariance(self) -> slice:
+        """The covariance of the error."""
+        return slice(self.nominal_size, self.nominal_size + self.errors * self.errors)
+
+    @property
+    def matched(self) -> slice:
+        """Matched covariances of the odometry's sensors."""
+        start = self.nominal_size + self.errors * self.errors
+        return slice(start, start + 9 * len(SENSORS))
+
+    @property
+    def mean(self) -> slice:
+        """Mean innovations of the odometry's sensors."""
+        start = self.matched.stop
+        return slice(start, start + 3 * len(SENSORS))
+
+    @property
+    def size(self) -> int:
+        """Length of the whole."""
+        return self.nominal_size + self.errors * self.errors + 12 * len(SENSORS)
+
+
+# Input of a prediction.
+IN_DT = 0  # s
+IN_THRUST = 1  # m/s^2, mean over dt, along the body z axis
+IN_RATE = slice(2, 5)  # rad/s, body, mean over dt
+IN_AIRBORNE = 5  # 1 in the air, 0 on the ground
+IN_BIAS_DENSITY = 6  # m^2/s
+IN_FORCE_DENSITY = 7  # m^2/s^4/s
+IN_ACCELERATION_DENSITY = 8  # m^2/s^4/Hz
+IN_ATTITUDE_DENSITY = 9  # rad^2/s^2/Hz
+IN_DRAG = slice(10, 13)  # 1/s
+PREDICTION_INPUTS = 13
+IN_MOTION = slice(0, 10)  # all but the drag
+
+# Further input of an odometry step.
+IN_QUATERNION = slice(13, 17)  # measured, body to world
+IN_POSITION = slice(17, 20)  # m, measured
+IN_VELOCITY = slice(20, 23)  # m/s, measured, world
+IN_USE = slice(23, 26)  # 1 = the sensor has something to say, in the order of SENSORS
+IN_CORRELATION = slice(26, 29)  # factor on the variance for the correlation in time, in the order of SENSORS
+IN_VARIANCE = slice(29, 32)  # configured variances (rad^2, m^2, m^2/s^2)
+IN_INTERVAL = 32  # s since the sample before
+IN_MATCHING_WEIGHT = 33  # 0..1, weight of this innovation in the matched covariance
+IN_MEAN_WEIGHT = 34  # 0..1, weight of this innovation in the mean innovation
+IN_BIAS_FREE = 35  # 1 while a marker makes the GNSS bias observable, else 0
+ODOMETRY_INPUTS = 36
+IN_MEASURED = slice(13, 29)  # quaternion, position, velocity, use, correlation
+IN_WEIGHTS = slice(32, 36)  # interval, matching weight, mean weight, bias free
+
+# Output of an odometry step beside the new packed state.
+OUT_NIS = slice(0, 3)  # normalised innovation squared
+OUT_ACCEPTED = slice(3, 6)  # 1 = used
+OUT_RESIDUAL = slice(6, 15)  # innovations (rad, m, m/s)
+ODOMETRY_OUTPUTS = 15

@@ -1,0 +1,146 @@
+"""Raw sensors of the simulated vehicle: inertial unit, magnetometer, barometer, GNSS receiver; world ENU, body FLU.
+
+White noise as PX4's simulator adds it, and biases that stay for the flight. Nothing in the vehicle flies by these; they
+are what a ground station looks at.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from dataclasses import dataclass
+
+import numpy as np
+
+from uasfly.frames import rotation_matrix
+from uasfly.messages import Array
+from uasfly.sim.body import GRAVITY_M_S2
+from uasfly.sim.estimate import Estimate
+from uasfly.sim.noise_rows import NoiseRows
+
+HOME_LATITUDE_DEG = 47.397742  # where PX4's simulator starts
+HOME_LONGITUDE_DEG = 8.545594
+HOME_ALTITUDE_M = 489.4
+_EARTH_RADIUS_M = 6371000.0
+_MAGNETIC_FIELD_GAUSS = (0.012, 0.213, -0.428)  # east, north, up as the recorded vehicle measured it there
+
+_ACCELEROMETER_NOISE_M_S2 = 0.1
+_ACCELEROMETER_BIAS_M_S2 = 0.05
+_GYRO_NOISE_RAD_S = 0.01
+_GYRO_BIAS_RAD_S = 0.003
+_MAGNETOMETER_NOISE_GAUSS = 0.02
+_BAROMETER_NOISE_M = 0.1
+_BAROMETER_BIAS_M = 0.3
+_GNSS_NOISE_M = 0.2
+_GNSS_HEIGHT_NOISE_M = 0.5
+_GNSS_VELOCITY_NOISE_M_S = 0.06
+_WIDTH = 16
+
+
+@dataclass(frozen=True, slots=True)
+class InertialSample:
+    """Inertial unit, magnetometer and barometer at `time_s`.
+
+    Attributes:
+        acceleration_in_body: (3,) specific force [m/s^2]; at rest (0, 0, 9.81).
+        angular_rate_in_body: (3,) [rad/s]. magnetic_field_in_body: (3,) [gauss].
+        pressure_altitude_m: height above sea level by the barometer.
+    """
+
+    time_s: float
+    acceleration_in_body: Array
+    angular_rate_in_body: Array
+    magnetic_field_in_body: Array
+    pressure_altitude_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class GnssSample:
+    """GNSS receiver at `time_s`; without a fix the position is the last one and the accuracies are 100 m.
+
+    Attributes:
+        fix: 3 with a position, 0 without. satellites: in use.
+        latitude_deg, longitude_deg, altitude_m: position, above sea level.
+        velocity_in_world: (3,) [m/s]. horizontal_accuracy_m, vertical_accuracy_m: of the position.
+    """
+
+    time_s: float
+    fix: int
+    satellites: int
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+    velocity_in_world: Array
+    horizontal_accuracy_m: float
+    vertical_accuracy_m: float
+
+
+def geographic_position(position_in_world: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Latitude [deg], longitude [deg] and height above sea level [m] of a point of the local world, on PX4's sphere."""
+    east, north, up = position_in_world
+    latitude = HOME_LATITUDE_DEG + math.degrees(north / _EARTH_RADIUS_M)
+    shrink = math.cos(math.radians(HOME_LATITUDE_DEG))
+    return latitude, HOME_LONGITUDE_DEG + math.degrees(east / (_EARTH_RADIUS_M * shrink)), HOME_ALTITUDE_M + up
+
+
+class RawSensors:
+    """Sensors of one vehicle.
+
+    Args:
+        rng: source of their noise and biases.
+        plant_state, acceleration: the plant's memory (see `dynamics.PlantDynamics`).
+        estimate: has GNSS or not, and its slow errors.
+    """
+
+    def __init__(
+        self, rng: np.random.Generator, plant_state: array[float], acceleration: array[float], estimate: Estimate
+    ) -> None:
+        self._state = plant_state
+        self._acceleration = acceleration
+        self._estimate = estimate
+        self._acceleration_bias = _ACCELEROMETER_BIAS_M_S2 * rng.standard_normal(3)
+        self._gyro_bias = _GYRO_BIAS_RAD_S * rng.standard_normal(3)
+        self._barometer_bias = _BAROMETER_BIAS_M * rng.standard_normal()
+        self._noise = NoiseRows(rng, _WIDTH)
+        self._steps_behind = 0
+        self._last_fix = geographic_position((plant_state[0], plant_state[1], plant_state[2]))
+
+    def advance(self) -> None:
+        """Go to the noise of the next step; it is drawn only when somebody reads."""
+        self._steps_behind += 1
+
+    def inertial(self, time_s: float) -> InertialSample:
+        """What inertial unit, magnetometer and barometer read now."""
+        state, noise = self._state, np.array(self._row())
+        to_body = rotation_matrix(np.array(state[6:10])).T
+        specific_force = np.array(self._acceleration)
+        specific_force[2] += GRAVITY_M_S2
+        return InertialSample(
+            time_s,
+            to_body @ specific_force + self._acceleration_bias + _ACCELEROMETER_NOISE_M_S2 * noise[0:3],
+            np.array(state[10:13]) + self._gyro_bias + _GYRO_NOISE_RAD_S * noise[3:6],
+            to_body @ np.array(_MAGNETIC_FIELD_GAUSS) + _MAGNETOMETER_NOISE_GAUSS * noise[6:9],
+            float(HOME_ALTITUDE_M + state[2] + self._barometer_bias + _BAROMETER_NOISE_M * noise[9]),
+        )
+
+    def gnss(self, time_s: float) -> GnssSample:
+        """What the GNSS receiver reads now."""
+        state, noise = self._state, self._row()
+        if not self._estimate.gnss_available:
+            return GnssSample(time_s, 0, 0, *self._last_fix, np.zeros(3), 100.0, 100.0)
+        bias = self._estimate.position_bias
+        self._last_fix = geographic_position(
+            (
+                state[0] + bias[0] + _GNSS_NOISE_M * noise[10],
+                state[1] + bias[1] + _GNSS_NOISE_M * noise[11],
+                state[2] + bias[2] + _GNSS_HEIGHT_NOISE_M * noise[12],
+            )
+        )
+        velocity = np.array(state[3:6]) + _GNSS_VELOCITY_NOISE_M_S * np.array(noise[13:16])
+        return GnssSample(time_s, 3, 10, *self._last_fix, velocity, 0.9, 1.78)
+
+    def _row(self) -> list[float]:
+        while self._steps_behind:
+            self._noise.advance()
+            self._steps_behind -= 1
+        return self._noise.row

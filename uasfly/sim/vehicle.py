@@ -1,0 +1,214 @@
+"""The simulated vehicle: plant, wind, sensors and a PX4-like autopilot, advanced step by step.
+
+Everything below MAVLink: who wants to talk to it as to PX4 puts a server or a link on top. The same seed and the same
+calls give the same flight bit for bit; reading a sample changes nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+
+import numpy as np
+
+from uasfly.messages import (
+    Array,
+    AttitudeTargetSample,
+    BatterySample,
+    FlightMode,
+    HealthSample,
+    OdometrySample,
+    TextSample,
+    TruthSample,
+    VehicleSample,
+)
+from uasfly.sim.autopilot import Autopilot
+from uasfly.sim.battery import Battery
+from uasfly.sim.dynamics import STEP_S, PlantDynamics
+from uasfly.sim.estimate import Estimate
+from uasfly.sim.parameters import ParameterTable
+from uasfly.sim.plant import Plant
+from uasfly.sim.scenario import Scenario
+from uasfly.sim.sensors import GnssSample, InertialSample, RawSensors
+from uasfly.sim.wind.field import WindField
+
+_OUTER_STEPS = 2  # position control at 125 Hz, as PX4's local position
+_SLOW_STEPS = 10  # commander, land detector and battery at 25 Hz
+
+
+class SimulatedVehicle:
+    """One vehicle in one scenario. Times are its own, in seconds since boot; world ENU, body FLU.
+
+    Args:
+        plant: what it is made of.
+        scenario: the wind and the sensors that it meets.
+        seed: of everything random.
+        start_position: (x, y, z) [m] where it stands; the ground is at z = 0.
+        start_yaw_rad: its heading there.
+
+    Attributes:
+        step_s: length of a step. parameters: PX4's parameters, name -> (type, value).
+    """
+
+    step_s = STEP_S
+
+    def __init__(
+        self,
+        plant: Plant,
+        scenario: Scenario,
+        seed: int,
+        start_position: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        start_yaw_rad: float = 0.0,
+    ) -> None:
+        wind_seed, estimate_seed, sensor_seed = np.random.SeedSequence(seed).spawn(3)
+        self.parameters = ParameterTable(plant.parameters)
+        self._dynamics = PlantDynamics(plant, STEP_S)
+        self._dynamics.place(start_position, math.cos(0.5 * start_yaw_rad), math.sin(0.5 * start_yaw_rad))
+        self._state = self._dynamics.state
+        self._wind = WindField(scenario.wind, np.random.default_rng(wind_seed), STEP_S)
+        self._battery = Battery(plant)
+        self._estimate = Estimate(scenario.sensors, np.random.default_rng(estimate_seed), self._state, STEP_S)
+        self._sensors = RawSensors(
+            np.random.default_rng(sensor_seed), self._state, self._dynamics.acceleration, self._estimate
+        )
+        self._autopilot = Autopilot(
+            plant.rotors, self.parameters, self._dynamics, self._estimate, _OUTER_STEPS * STEP_S, _SLOW_STEPS * STEP_S
+        )
+        self._steps = 0
+
+    @property
+    def time_s(self) -> float:
+        """Vehicle time of the last step."""
+        return self._steps * STEP_S
+
+    def advance_to(self, time_s: float) -> None:
+        """Simulate up to the last whole step at or before `time_s`; does nothing for times past."""
+        target = math.floor(time_s / STEP_S + 1e-6)
+        while self._steps < target:
+            self._step()
+
+    def _step(self) -> None:
+        steps, state, dynamics, autopilot = self._steps, self._state, self._dynamics, self._autopilot
+        now = steps * STEP_S
+        if steps % _SLOW_STEPS == 0:
+            self._battery.draw(state[13:], _SLOW_STEPS * STEP_S)
+            autopilot.full_speed_rad_s = self._battery.full_speed_rad_s()
+            autopilot.look_after(now, self._battery.charge)
+        if steps % _OUTER_STEPS == 0:
+            autopilot.steer(now)
+        autopilot.stabilise()
+        x, y, z, vx, vy, vz = state[0:6]
+        engaged = autopilot.engaged_at_s
+        air = self._wind.step((x, y, z), (vx, vy, vz), None if engaged is None else now - engaged)
+        dynamics.wind[:] = array("d", air.free_in_world + air.jet_in_world)
+        dynamics.step()
+        self._steps = steps + 1
+        self._estimate.advance()
+        self._sensors.advance()
+
+    def set_attitude_target(self, quaternion_body_to_world: Array, thrust: float, yaw_rate_rad_s: float | None) -> None:
+        """Take a setpoint as SET_ATTITUDE_TARGET carries it; it acts in offboard.
+
+        Args:
+            quaternion_body_to_world: (4,), normalised here.
+            thrust: 0..1, clipped as PX4's mixer does.
+            yaw_rate_rad_s: feed-forward about the world's vertical, None for none.
+
+        Raises:
+            ValueError: a number is not finite, or the quaternion has no length; PX4 would not survive them either.
+        """
+        w, x, y, z = (float(value) for value in quaternion_body_to_world)
+        length = math.sqrt(w * w + x * x + y * y + z * z)
+        yaw_rate = 0.0 if yaw_rate_rad_s is None else yaw_rate_rad_s
+        if not (math.isfinite(length) and length > 1e-3 and math.isfinite(thrust) and math.isfinite(yaw_rate)):
+            raise ValueError(
+                f"expected a finite attitude target, found {quaternion_body_to_world}, {thrust}, {yaw_rate_rad_s}"
+            )
+        attitude = (w / length, x / length, y / length, z / length)
+        self._autopilot.take_setpoint(self.time_s, attitude, min(1.0, max(0.0, thrust)), yaw_rate)
+
+    def set_mode(self, mode: FlightMode) -> tuple[bool, str]:
+        """Ask for a mode; whether it was granted, and why not."""
+        return self._autopilot.set_mode(mode, self.time_s, self._battery.charge)
+
+    def arm(self) -> tuple[bool, str]:
+        """Ask to arm; whether it was granted, and why not."""
+        return self._autopilot.arm(self.time_s, self._battery.charge)
+
+    def disarm(self, forced: bool = False) -> tuple[bool, str]:
+        """Ask to disarm; in the air only when `forced`."""
+        return self._autopilot.disarm(self.time_s, self._battery.charge, forced)
+
+    def set_takeoff_height(self, height_m: float) -> None:
+        """Set the height above home that the next take-off climbs to, in the place of MIS_TAKEOFF_ALT."""
+        self._autopilot.modes.takeoff_height_m = height_m
+
+    def set_gnss(self, available: bool) -> None:
+        """Take the source of positions (GNSS, motion capture) away, or give it back."""
+        self._autopilot.set_gnss(available)
+
+    def set_gnss_offset(self, offset_in_world: tuple[float, float, float]) -> None:
+        """Shift all positions that the source gives from now on [m]."""
+        self._estimate.gnss_offset = offset_in_world
+
+    def set_motor_effectiveness(self, motor: int, effectiveness: float) -> None:
+        """Let a motor (0 is the first) give this share of its thrust, 1 when it is sound."""
+        self._dynamics.effectiveness[motor] = effectiveness
+
+    def set_battery_charge(self, charge: float) -> None:
+        """Set the battery's charge, 0..1."""
+        self._battery.charge = charge
+
+    def refuse(self, arming: bool, offboard: bool) -> None:
+        """Let the vehicle refuse to arm, or to enter offboard, whatever its state."""
+        self._autopilot.commander.refuse_arming = arming
+        self._autopilot.commander.refuse_offboard = offboard
+
+    def odometry(self) -> OdometrySample:
+        """The estimate of position, velocity, attitude and rates."""
+        return self._estimate.odometry(self.time_s)
+
+    def truth(self) -> TruthSample:
+        """The true state, and what the wind does."""
+        state, wind = self._state, self._dynamics.wind
+        return TruthSample(
+            self.time_s,
+            np.array(state[0:3]),
+            np.array(state[3:6]),
+            np.array(state[6:10]),
+            np.array(self._dynamics.wind_force()),
+            np.array(wind[0:3]) + np.array(wind[3:6]),
+        )
+
+    def battery(self) -> BatterySample:
+        """Voltage and charge."""
+        return BatterySample(self.time_s, self._battery.voltage_v, self._battery.charge)
+
+    def state(self) -> VehicleSample:
+        """Mode, arming and landed state."""
+        commander = self._autopilot.commander
+        return VehicleSample(self.time_s, commander.mode, commander.armed, not self._autopilot.land_detector.landed)
+
+    def health(self) -> HealthSample:
+        """Estimator and GNSS."""
+        estimate = self._estimate
+        fix, satellites = (3, 10) if estimate.gnss_available else (0, 0)
+        ok = estimate.position_ok
+        return HealthSample(self.time_s, ok, ok, estimate.attitude_ok, fix, satellites, estimate.horizontal_accuracy_m)
+
+    def attitude_target(self) -> AttitudeTargetSample:
+        """What the attitude controller is asked for, by whichever mode flies."""
+        target = self._autopilot.target
+        return AttitudeTargetSample(self.time_s, np.array(target.attitude), target.thrust)
+
+    def inertial(self) -> InertialSample:
+        """Accelerometer, gyro, magnetometer and barometer."""
+        return self._sensors.inertial(self.time_s)
+
+    def gnss(self) -> GnssSample:
+        """GNSS receiver."""
+        return self._sensors.gnss(self.time_s)
+
+    def take_texts(self) -> list[TextSample]:
+        """Status texts since the last call, oldest first."""
+        return self._autopilot.commander.take_texts()
