@@ -9,7 +9,7 @@ import pytest
 
 
 def test_data(relative_path: str) -> Path:
-    """Path of a file under UASFLY_TEST_DATA (the folder that holds px4_recordings/ and data/); skips where it is not there."""
+    """Path of a file under UASFLY_TEST_DATA (it holds px4_recordings/ and data/); skips where it is not there."""
     root = os.environ.get("UASFLY_TEST_DATA")
     if not root:
         pytest.skip("UASFLY_TEST_DATA is not set: it names the folder that holds px4_recordings/ and data/")

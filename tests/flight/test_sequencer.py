@@ -46,6 +46,7 @@ class Script:
     mute: set[RequestKind] = field(default_factory=set)
     legs_done: bool = False
     sigma_m: float = 0.01
+    lands: bool = True
     asked: list[RequestKind] = field(default_factory=list)
     texts: list[str] = field(default_factory=list)
     _queue: list[Sample] = field(default_factory=list)
@@ -86,7 +87,9 @@ class Script:
             case RequestKind.HOLD:
                 self.mode = FlightMode.HOLD
             case RequestKind.LAND | RequestKind.RETURN:
-                self.mode, self.armed, self.in_air = FlightMode.LAND, False, False
+                self.mode = FlightMode.LAND
+                if self.lands:
+                    self.armed = self.in_air = False
             case _:
                 pass
 
@@ -268,3 +271,177 @@ def test_silence_from_the_start_ends_with_what_was_missing() -> None:
     script.run(16.0)
     assert script.sequencer.phase is Phase.ABORTED
     assert "no heartbeat" in script.sequencer.reason
+
+
+def test_the_pilot_leaving_offboard_is_noticed_at_once_when_offboard_has_been_seen() -> None:
+    """The grace is for a heartbeat that is late, not for a pilot who is quick."""
+    script = _in_legs()
+    script.mode = FlightMode.POSITION
+    script.run(PERIOD_S)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert "left offboard for position" in script.sequencer.reason
+
+
+def test_an_old_heartbeat_after_the_mode_change_is_no_take_over() -> None:
+    """Offboard accepted, but the last heartbeat still tells hold: the legs fly on, and end when hold stays."""
+    script = _script()
+    script.run(5.0)
+    while script.sequencer.phase is not Phase.LEGS:
+        script.run(PERIOD_S)
+        if script.mode is FlightMode.OFFBOARD:
+            script.mode = FlightMode.HOLD
+    script.run(1.0)
+    assert script.sequencer.phase is Phase.LEGS
+    script.run(1.0)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert "left offboard for hold" in script.sequencer.reason
+
+
+def test_a_mode_change_while_engaging_is_the_pilots() -> None:
+    """Position mode after take-off: offboard is not asked for, and nothing else."""
+    script = _script()
+    while script.sequencer.phase is not Phase.ENGAGE:
+        script.run(PERIOD_S)
+    script.mode = FlightMode.POSITION
+    script.run(3.0)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert "left hold for position" in script.sequencer.reason
+    assert script.asked == [RequestKind.ARM, RequestKind.TAKEOFF]
+
+
+def test_a_mode_change_during_take_off_is_the_pilots() -> None:
+    """Return instead of take-off: aborted at once instead of waiting for a hold that is not ours."""
+    script = _script()
+    script.run(2.0)
+    assert script.mode is FlightMode.TAKEOFF
+    script.mode = FlightMode.RETURN
+    script.run(PERIOD_S)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert "left take-off for return" in script.sequencer.reason
+
+
+@pytest.mark.parametrize("refuse", [{RequestKind.LAND}, {RequestKind.HOLD, RequestKind.LAND}, set[RequestKind]()])
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_a_mode_change_while_ending_is_the_pilots(refuse: set[RequestKind], interrupted: bool) -> None:
+    """Before or after hold or land was accepted: the pilot's position mode stops both setpoints and requests."""
+    script = _in_legs()
+    script.run(1.0)
+    script.lands, script.refuse = False, refuse
+    script.legs_done = not interrupted
+    if interrupted:
+        script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
+    script.run(0.1)
+    script.mode = FlightMode.POSITION
+    asked = len(script.asked)
+    script.run(5.0)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert not script.sequencer.streaming
+    assert len(script.asked) == asked
+
+
+def test_a_vehicle_that_disarms_in_the_legs_ends_the_flight() -> None:
+    """A kill switch or a crash does not count as a completed mission."""
+    script = _in_legs()
+    script.armed = False
+    script.run(0.1)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert "disarmed" in script.sequencer.reason
+
+
+def test_refused_hold_goes_on_to_the_ending() -> None:
+    """Without a position PX4 refuses hold: after the interrupt landing is asked for, and setpoints flow until then."""
+    script = _in_legs()
+    script.refuse = {RequestKind.HOLD}
+    script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
+    script.run(0.5)
+    assert script.sequencer.streaming
+    script.run(3.0)
+    assert script.asked[-2:] == [RequestKind.HOLD, RequestKind.LAND]
+    assert script.sequencer.phase is Phase.ABORTED
+    assert script.sequencer.reason == "stopped by Ctrl-C"
+
+
+def test_a_vehicle_that_was_taken_off_is_not_left_hovering() -> None:
+    """Refused offboard: after the time-out hold and landing are asked for."""
+    script = _script()
+    script.refuse = {RequestKind.OFFBOARD}
+    script.run(25.0)
+    assert script.asked[-2:] == [RequestKind.HOLD, RequestKind.LAND]
+    assert not script.armed
+
+
+def test_an_interrupt_leaves_a_vehicle_that_the_pilot_flies_alone() -> None:
+    """Engage by pilot, still waiting for the switch: Ctrl-C asks for nothing and hands nothing over."""
+    script = _script(Engage.PILOT)
+    script.armed = script.in_air = True
+    script.run(5.0)
+    assert script.sequencer.phase is Phase.ENGAGE
+    script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
+    script.run(1.0)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert script.asked == []
+    assert not script.sequencer.hand_over
+
+
+def test_a_pilot_who_lands_again_is_waited_for_anew() -> None:
+    """On the ground nothing is streamed, and offboard there does not start the legs."""
+    script = _script(Engage.PILOT)
+    script.armed = script.in_air = True
+    script.run(5.0)
+    script.armed = script.in_air = False
+    script.mode = FlightMode.OFFBOARD
+    script.run(1.0)
+    assert script.sequencer.phase is Phase.PREFLIGHT
+    assert not script.sequencer.streaming
+
+
+def test_a_short_uncertainty_after_a_long_wait_is_forgiven() -> None:
+    """A pilot may wait for minutes: only half a minute without being ready in a row ends the flight."""
+    script = _script(Engage.PILOT)
+    script.run(60.0)
+    script.sigma_m = 2.0
+    script.run(5.0)
+    assert script.sequencer.phase is Phase.PREFLIGHT
+    script.sigma_m = 0.01
+    script.run(5.0)
+    script.sigma_m = 2.0
+    script.run(28.0)
+    assert script.sequencer.phase is Phase.PREFLIGHT
+    script.run(3.0)
+    assert script.sequencer.phase is Phase.ABORTED
+
+
+def test_an_interrupt_while_ending_is_answered() -> None:
+    """The first Ctrl-C during the landing changes nothing and says so; the second leaves the landing to PX4."""
+    script = _in_legs()
+    script.lands, script.legs_done = False, True
+    script.run(0.1)
+    script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
+    script.run(0.1)
+    assert script.sequencer.phase is Phase.ENDING
+    assert any("once more hands over" in text for text in script.texts)
+    script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
+    assert script.sequencer.phase is Phase.ABORTED
+    assert not script.sequencer.hand_over
+
+
+@pytest.mark.parametrize(("seconds", "hand_over"), [(0.5, False), (3.0, True), (12.0, True)])
+def test_leaving_hands_over_what_uasfly_flies(seconds: float, hand_over: bool) -> None:
+    """An error on the ground leaves nothing to hold; after take-off the driver must ask for hold."""
+    script = _script()
+    script.run(seconds)
+    script.sequencer.leave(script.time_s, "a bug")
+    assert script.sequencer.phase is Phase.ABORTED
+    assert script.sequencer.hand_over is hand_over
+    assert script.sequencer.reason == "a bug"
+
+
+def test_odometry_from_the_future_is_stale() -> None:
+    """A wrong clock stops the setpoints as silence does, and one wrong stamp does not hide the silence after it."""
+    script = _in_legs()
+    script.silent = True
+    script.view.update((OdometrySample(script.time_s + 1000.0, ZERO, ZERO, LEVEL, ZERO),))
+    script.run(0.1)
+    assert not script.sequencer.streaming
+    script.run(6.0)
+    assert script.sequencer.phase is Phase.ABORTED

@@ -1,16 +1,19 @@
 """The live view of a flight: phase, position and error, force, solve time, progress and the last warnings.
 
-On a terminal it redraws four times a second, between two control cycles; without one it prints plain lines.
+On a terminal it redraws four times a second; without one it prints plain lines. `update` may be called from another
+thread than the rest.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import types
 from collections import deque
 
 from rich.console import Console, Group
 from rich.live import Live
+from rich.markup import escape
 from rich.panel import Panel
 from rich.progress_bar import ProgressBar
 from rich.table import Table
@@ -30,7 +33,7 @@ class LiveView:
     def __init__(self, mission: str, airframe: str, console: Console | None = None) -> None:
         """Prepare for a mission and airframe; `console` is stderr unless a test hands one in."""
         self._console = console or Console(stderr=True)
-        self._title = f"uasfly · {mission} · {airframe}"
+        self._title = escape(f"uasfly · {mission} · {airframe}")
         self._live = Live(console=self._console, auto_refresh=False, transient=True)
         self._rich = self._console.is_terminal
         self._last_s = -math.inf
@@ -45,7 +48,8 @@ class LiveView:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None
     ) -> None:
         if self._rich:
-            self._live.stop()
+            with contextlib.suppress(OSError):  # the terminal may be gone; the flight's result is not
+                self._live.stop()
 
     def say(self, text: str) -> None:
         """One line that is not part of a step (connecting, waiting)."""

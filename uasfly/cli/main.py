@@ -1,4 +1,4 @@
-"""The command line: every command, and the one place where an error becomes a message and exit code 2."""
+"""The command line: every command, and the one place where an error becomes a message and an exit code."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import typer
 from uasfly import __version__
 from uasfly.cli import check, fly, rehearse, sim
 
+EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
 
 app = typer.Typer(
@@ -41,8 +42,11 @@ sim.register(app)
 
 
 def main() -> None:
-    """Entry point: wrong input ends with its message on stderr and exit code 2, without a traceback."""
-    from uasfly.errors import UasflyError
+    """Entry point: wrong input ends with its message on stderr and exit code 2, anything unexpected with exit code 1.
+
+    Tracebacks are for those who set UASFLY_DEBUG.
+    """
+    from uasfly.errors import UasflyError, describe_error
 
     try:
         app()
@@ -53,3 +57,6 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.stderr.write("uasfly: interrupted\n")
         sys.exit(130)
+    except Exception as error:
+        sys.stderr.write(f"uasfly: {describe_error(error)}\n")
+        sys.exit(EXIT_FAILED)

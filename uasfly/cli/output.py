@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 
@@ -14,7 +16,7 @@ def check_writable(path: Path | None, what: str) -> None:
     """Refuse a result file that cannot be written before anything flies, not after.
 
     Raises:
-        FileError: when its folder does not exist or it is a folder.
+        FileError: when its folder does not exist, it is a folder, or it may not be written.
     """
     from uasfly.errors import FileError
 
@@ -24,30 +26,39 @@ def check_writable(path: Path | None, what: str) -> None:
         raise FileError(str(path), [f"expected a file for the {what}, found a folder"])
     if not path.parent.is_dir():
         raise FileError(str(path), [f"the folder for the {what} does not exist; make it first"])
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise FileError(str(path), [f"the {what} may not be written here; choose another place"])
 
 
 def finish(summary: dict[str, Any], path: Path | None, *, as_json: bool) -> int:
-    """Show the summary, write it where asked, and return the exit code: 0 completed, 1 aborted."""
+    """Write the summary where asked, show it, and return the exit code: 0 completed, 1 aborted.
+
+    Raises:
+        FileError: when the file cannot be written; the summary has been shown nevertheless.
+    """
     from uasfly.flight.summary import write_summary
 
-    if path is not None:
-        write_summary(summary, path)
-    if as_json:
-        print(json.dumps(summary, indent=2))
-    else:
-        Console().print(summary_table(summary))
+    try:
+        if path is not None:
+            write_summary(summary, path)
+    finally:
+        if as_json:
+            print(json.dumps(summary, indent=2))
+        else:
+            Console().print(summary_table(summary))
     return 0 if summary["outcome"] == "completed" else 1
 
 
 def summary_table(summary: dict[str, Any]) -> Table:
     """The summary as a table that reads in a terminal of 80 columns."""
     scenario = summary["scenario"] or "real vehicle"
-    table = Table(title=f"{summary['mission']} · {summary['airframe']} · {scenario}", show_header=False)
+    title = escape(f"{summary['mission']} · {summary['airframe']} · {scenario}")
+    table = Table(title=title, show_header=False)
     table.add_column(style="bold")
     table.add_column()
     outcome = summary["outcome"]
     colour = "green" if outcome == "completed" else "red"
-    reason = f": {summary['reason']}" if summary["reason"] else ""
+    reason = f": {escape(summary['reason'])}" if summary["reason"] else ""
     table.add_row("outcome", f"[{colour}]{outcome}[/]{reason}")
     table.add_row("duration", f"{summary['duration_s']:.1f} s, {summary['real_time_factor']} times real time")
     table.add_row(f"tracking RMS (against {summary['tracking_against']})", _axes(summary["tracking_rms_m"]))
@@ -67,7 +78,7 @@ def summary_table(summary: dict[str, Any]) -> Table:
     table.add_row("fallback steps", str(summary["fallback_steps"]))
     table.add_row("rejected measurements", ", ".join(f"{k} {v}" for k, v in summary["rejected"].items()) or "none")
     for warning in summary["warnings"]:
-        table.add_row("[yellow]warning[/]", warning)
+        table.add_row("[yellow]warning[/]", escape(warning))
     return table
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import types
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from uasfly.messages import Status
@@ -20,8 +21,8 @@ class RehearsalProgress:
         console = Console(stderr=True)
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
         self._progress = Progress(*columns, TimeElapsedColumn(), console=console, disable=not console.is_terminal)
-        self._name = name
-        self._task = self._progress.add_task(name, total=1.0)
+        self._name = escape(name)
+        self._task = self._progress.add_task(self._name, total=1.0)
         self._cycles = 0
 
     def __enter__(self) -> RehearsalProgress:

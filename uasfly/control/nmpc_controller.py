@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from uasfly.airframe import Airframe
+from uasfly.control.authority import holdable_force, nearby
 from uasfly.control.backup import PositionPid
 from uasfly.control.delay import LONGEST_PREDICTION_S, DelayPredictor, state_of
 from uasfly.control.iteration import RealTimeIteration
@@ -132,6 +133,7 @@ class NmpcController:
         ):
             return SolveStatus.BAD_INPUT, 0.0
         self._force = force
+        force = holdable_force(force, self._airframe.limits, k_thrust)
         parameters = controller_parameters(self._airframe.model, force, k_thrust)
         state = state_of(estimate.position_in_world, estimate.velocity_in_world, attitude.roll_rad, attitude.pitch_rad)
         work.initial[:], yaw_rad = self._delay.predict(
@@ -140,7 +142,7 @@ class NmpcController:
         error = wrap_angle(float(reference.yaw_rad[0]) - yaw_rad)
         np.subtract(reference.yaw_rad, self._yaw.remaining_error(error, self._times), out=work.yaw)
         work.parameters[:], work.force[:] = parameters, force
-        work.position[:] = reference.position_in_world
+        work.position[:] = nearby(reference.position_in_world, work.initial[:3])
         work.velocity[:] = reference.velocity_in_world
         work.acceleration[:] = reference.acceleration_in_world
         if self._timer is None:

@@ -108,12 +108,12 @@ def schema_of(kind: str) -> dict[str, Any]:
 
 def _locate(name: str) -> tuple[Path, Kind]:
     """Where a file is and what kind it is meant to be: by its fields, or by the folder that ships the name."""
-    if Path(name).suffix in (".yaml", ".yml") or Path(name).exists():
+    if Path(name).suffix in (".yaml", ".yml") or Path(name).is_file():
         path = Path(name)
         fields = top_level_fields(path)
         kind = max(_SIGNS, key=lambda candidate: len(_SIGNS[candidate] & fields))
         if not _SIGNS[kind] & fields:
-            raise FileError(name, [f"expected a {', a '.join(MODELS)}, found none of their fields"])
+            raise FileError(name, ["expected a mission, an airframe, a scenario or a plant, found fields of none"])
         return path, kind
     for candidate in ("mission", "airframe", "scenario", "plant"):
         try:

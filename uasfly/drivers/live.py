@@ -7,126 +7,185 @@ import contextlib
 import gc
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from uasfly.drivers.plan import FlightPlan, build_pilot
+from uasfly.drivers.plan import FlightPlan
+from uasfly.drivers.watching import BackgroundWatch, Watch
+from uasfly.errors import describe_error
 from uasfly.flight.pilot import Pilot, StepResult
-from uasfly.flight.sequencer import Engage
 from uasfly.flight.summary import SummaryCollector
-from uasfly.link.mavsdk_link import MavsdkLink
-from uasfly.messages import Request, RequestKind, Sample, Status
+from uasfly.link.protocol import VehicleLink
+from uasfly.messages import Phase, Request, RequestKind, RequestResult, Sample, Status
 from uasfly.record.writer import BackgroundLogWriter
 
-HAND_OVER_S = 0.5  # time for the last request to leave and be answered
+HAND_OVER_S = 2.5  # time for the last request to be repeated and answered
+HAND_OVER_POLL_S = 0.05
 
 
 async def fly(
-    plan: FlightPlan,
-    link: MavsdkLink,
-    engage: Engage,
-    log: Path | None = None,
-    watch: Callable[[Status, float | None], None] | None = None,
+    plan: FlightPlan, pilot: Pilot, link: VehicleLink, log: Path | None = None, watch: Watch | None = None
 ) -> dict[str, Any]:
     """Fly a plan over an open link and return its summary; the link is left open for its owner.
 
     SIGINT, SIGTERM and SIGHUP end the mission: the first holds and goes on to the mission's ending, the second hands
-    over at once.
+    over at once. An unexpected error ends the flight too: nothing more is streamed, the vehicle is asked to hold, the
+    log is closed, and the summary's reason tells the error.
 
     Args:
         plan: what to fly.
+        pilot: made for this plan (`build_pilot`).
         link: the connected vehicle.
-        engage: who arms, takes off and switches to offboard.
         log: file for the flight log, None for none.
-        watch: called with each step's status and the solve time [ms] (None where nothing was solved).
+        watch: called in a thread of its own with each step's status and the solve time [ms] (None: nothing solved).
 
     Raises:
         FileError: when the log cannot be opened.
     """
-    pilot = build_pilot(plan, engage, time.perf_counter)
-    summary = SummaryCollector()
     writer = BackgroundLogWriter(log, plan.description()) if log is not None else None
+    flight = _LiveFlight(pilot, link, writer, BackgroundWatch(watch) if watch is not None else None)
     started = time.monotonic()
     gc.collect()
     gc.freeze()  # what lives now lives to the end: no need to look through it in flight
-    try:
-        with _signals(pilot):
-            await _cycles(plan, pilot, link, summary, writer, watch)
-        if pilot.sequencer.hand_over:
-            link.request(Request(RequestKind.HOLD))
-            await asyncio.sleep(HAND_OVER_S)
-    finally:
-        gc.unfreeze()
-        if writer is not None:
-            writer.close()
-            if writer.problem:
-                summary.warn(writer.problem)
+    with _signals(pilot):
+        try:
+            await flight.run(1.0 / plan.airframe.controller.rate_hz)
+        finally:
+            gc.unfreeze()
+            flight.close()
     wall_s = time.monotonic() - started
-    return summary.result(wall_s=wall_s, rejected=pilot.observer.counters.rejected, **plan.identity())
+    return flight.summary.result(wall_s=wall_s, rejected=pilot.observer.counters.rejected, **plan.identity())
 
 
-async def _cycles(
-    plan: FlightPlan,
-    pilot: Pilot,
-    link: MavsdkLink,
-    summary: SummaryCollector,
-    writer: BackgroundLogWriter | None,
-    watch: Callable[[Status, float | None], None] | None,
-) -> None:
-    period_s = 1.0 / plan.airframe.controller.rate_hz
-    deadline = time.monotonic()
-    log_lost = False
-    while not pilot.done:
-        deadline += period_s
-        now = time.monotonic()
-        if now > deadline + period_s:  # a cycle was missed: go on from here instead of hurrying after it
-            deadline = now
-        await asyncio.sleep(max(0.0, deadline - now))
+class _LiveFlight:
+    """One flight with those who listen to it: summary, log and live view."""
+
+    def __init__(
+        self, pilot: Pilot, link: VehicleLink, writer: BackgroundLogWriter | None, watch: BackgroundWatch | None
+    ) -> None:
+        self.summary = SummaryCollector()
+        self._pilot = pilot
+        self._link = link
+        self._writer = writer
+        self._watch = watch
+        self._log_lost = False
+
+    async def run(self, period_s: float) -> None:
+        """Cycle until the flight has ended, and leave a vehicle that still flies in hold."""
+        try:
+            await self._cycles(period_s)
+        except Exception as error:
+            self._break_off(describe_error(error))
+        if self._pilot.sequencer.hand_over:
+            await self._hand_over()
+
+    def close(self) -> None:
+        """Close log and view; what went wrong with them is in the summary."""
+        if self._writer is not None:
+            self._writer.close()
+            if self._writer.problem:
+                self.summary.warn(self._writer.problem)
+        if self._watch is not None:
+            self._watch.close()
+            if self._watch.problem:
+                self.summary.warn(self._watch.problem)
+
+    async def _cycles(self, period_s: float) -> None:
+        deadline = time.monotonic()
+        while not self._pilot.done:
+            deadline += period_s
+            now = time.monotonic()
+            if now > deadline + period_s:  # a cycle was missed: go on from here instead of hurrying after it
+                deadline = now
+            await asyncio.sleep(max(0.0, deadline - now))
+            self._cycle()
+
+    def _cycle(self) -> None:
         begun = time.monotonic()
-        samples = link.poll()
-        result = pilot.step(begun, samples)
+        samples = self._link.poll()
+        result = self._pilot.step(begun, samples)
         if result.setpoint is not None:
-            link.send(result.setpoint)
-            summary.setpoint_sent(time.monotonic())
+            self._link.send(result.setpoint)
+            self.summary.setpoint_sent(time.monotonic())
         for request in result.requests:
-            link.request(request)
+            self._link.request(request)
         cycle_ms = (time.monotonic() - begun) * 1e3
-        if writer is not None and writer.problem and not log_lost:
-            log_lost = True
-            pilot.announce(3, writer.problem)
-        _account(summary, writer, result, samples, cycle_ms)
-        if watch is not None:
-            watch(result.status, None if result.control is None else result.control.solve_ms)
+        if self._writer is not None and self._writer.problem and not self._log_lost:
+            self._log_lost = True
+            self._pilot.announce(3, self._writer.problem)
+        solve_ms = None if result.control is None else result.control.solve_ms
+        self.summary.timed(solve_ms, cycle_ms)
+        self.summary.cycle(result.status, samples)
+        self._record(result, samples)
+        if self._watch is not None:
+            self._watch(result.status, solve_ms)
 
+    def _record(self, result: StepResult, samples: tuple[Sample, ...]) -> None:
+        if self._writer is not None:
+            for message in (*samples, *result.requests, result.setpoint, result.status):
+                if message is not None:
+                    self._writer.write(message, result.status.time_s)
 
-def _account(
-    summary: SummaryCollector,
-    writer: BackgroundLogWriter | None,
-    result: StepResult,
-    samples: tuple[Sample, ...],
-    cycle_ms: float,
-) -> None:
-    summary.timed(None if result.control is None else result.control.solve_ms, cycle_ms)
-    summary.cycle(result.status, samples)
-    if writer is not None:
-        for message in (*samples, *result.requests, result.setpoint, result.status):
-            if message is not None:
-                writer.write(message, result.status.time_s)
+    def _break_off(self, reason: str) -> None:
+        """End a flight whose cycle has failed; its step gives no status any more, so this one stands for it."""
+        now = time.monotonic()
+        self._pilot.leave(now, reason)
+        texts = tuple(self._pilot.sequencer.announcements)
+        status = Status(now, Phase.ABORTED, -1, False, 0.0, None, None, reason=reason, announcements=texts)
+        if self._writer is not None:
+            self._writer.write(status, now)
+        if self._watch is not None:
+            self._watch(status, None)
+        self.summary.abort(status)
+
+    async def _hand_over(self) -> None:
+        """Ask for hold and wait for the answer: the link repeats the request only while this program runs."""
+        request = Request(RequestKind.HOLD)
+        problem = "the vehicle has not answered the last request, hold"
+        try:
+            self._link.request(request)
+            for _ in range(round(HAND_OVER_S / HAND_OVER_POLL_S)):
+                await asyncio.sleep(HAND_OVER_POLL_S)
+                answer = self._answer_to(request)
+                if answer is not None:
+                    problem = "" if answer.accepted else f"the last request, hold, was refused: {answer.text}"
+                    break
+        except Exception as error:
+            problem = f"hold could not be asked for: {describe_error(error)}"
+        if problem:
+            self.summary.warn(problem)
+
+    def _answer_to(self, request: Request) -> RequestResult | None:
+        try:
+            samples = self._link.poll()
+        except Exception:  # perhaps what has ended the flight; the request is on its way nevertheless
+            return None
+        answer = None
+        for sample in samples:
+            if self._writer is not None:
+                self._writer.write(sample, time.monotonic())
+            if isinstance(sample, RequestResult) and sample.request is request:
+                answer = sample
+        return answer
 
 
 @contextlib.contextmanager
-def _signals(pilot: Pilot) -> Any:
-    """Route SIGINT, SIGTERM and SIGHUP to the pilot while a flight goes on."""
+def _signals(pilot: Pilot) -> Iterator[None]:
+    """Route SIGINT, SIGTERM and SIGHUP to the pilot; a SIGHUP that is ignored (nohup) stays so."""
     loop = asyncio.get_running_loop()
     texts = {signal.SIGINT: "stopped by Ctrl-C", signal.SIGTERM: "told to terminate", signal.SIGHUP: "terminal closed"}
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+        del texts[signal.SIGHUP]
+    before = {number: signal.getsignal(number) for number in texts}
     for number, text in texts.items():
         loop.add_signal_handler(number, _interrupt, pilot, text)
     try:
         yield
     finally:
-        for number in texts:
+        for number, handler in before.items():
             loop.remove_signal_handler(number)
+            signal.signal(number, handler)
 
 
 def _interrupt(pilot: Pilot, text: str) -> None:

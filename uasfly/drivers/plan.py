@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -88,14 +89,24 @@ def load_plan(
     return FlightPlan(airframe_model, mission_model, controller, seed, scenario_model, plant)
 
 
-def build_pilot(plan: FlightPlan, engage: Engage, timer: Callable[[], float] | None) -> Pilot:
-    """Observer, controller and phases for a plan; `timer` (perf_counter) measures the solver, None leaves it out."""
-    from uasfly.control.controller import NmpcController, PidController
+def build_pilot(plan: FlightPlan, engage: Engage, timer: Callable[[], float] | None, *, late_counts: bool) -> Pilot:
+    """Observer, controller and phases for a plan; takes some seconds where the solver is not compiled yet.
+
+    Args:
+        plan: what to fly.
+        engage: who brings the vehicle into offboard.
+        timer: measures the solver (perf_counter); None leaves it out.
+        late_counts: whether a solve that took too long by the timer is replaced; not where time is simulated.
+    """
+    from uasfly.control.controller import Controller, NmpcController, PidController
     from uasfly.observer.observer import Observer
 
-    observer = Observer(plan.airframe)
-    controller_type = NmpcController if plan.controller == "nmpc" else PidController
-    return Pilot(plan.airframe, plan.mission, observer, controller_type(plan.airframe, timer=timer), engage)
+    controller: Controller
+    if plan.controller == "nmpc":
+        controller = NmpcController(plan.airframe, timer=timer, deadline_s=None if late_counts else math.inf)
+    else:
+        controller = PidController(plan.airframe, timer=timer)
+    return Pilot(plan.airframe, plan.mission, Observer(plan.airframe), controller, engage)
 
 
 def _split_settings(settings: list[str]) -> dict[str, dict[str, object]]:

@@ -31,7 +31,7 @@ class Monitors:
         text = ""
         fence = self._limits.geofence
         from_center = 0.0 if fence is None else math.hypot(x - fence.center_m[0], y - fence.center_m[1])
-        if fence is not None and from_center > fence.radius_m + MARGIN_M:
+        if fence is not None and not from_center <= fence.radius_m + MARGIN_M:  # also where it is not finite
             text = f"outside the geofence: {from_center:.1f} m from its centre"
         elif not self._limits.altitude_min_m - MARGIN_M <= z <= self._limits.altitude_max_m + MARGIN_M:
             text = f"outside the altitude limits: {z:.1f} m"

@@ -81,7 +81,7 @@ class SummaryCollector:
         for severity, text in status.announcements:
             if severity <= 4 and text not in self._warnings:
                 self._warnings.append(text)
-        if status.phase in (Phase.ENGAGE, Phase.LEGS) and status.fallback:
+        if status.fallback:
             self._fallbacks[status.fallback] = self._fallbacks.get(status.fallback, 0) + 1
         flying = status.phase is Phase.LEGS and status.estimate is not None
         if flying and status.reference_position_in_world is not None and status.leg_started:
@@ -99,6 +99,10 @@ class SummaryCollector:
             elif isinstance(sample, OdometrySample):
                 self._pending_gnss.append(sample)
         self._compare()
+
+    def abort(self, status: Status) -> None:
+        """The flight was broken off outside of the step; `status` tells why, and nothing is computed from it."""
+        self._phase, self._reason = status.phase, status.reason
 
     def setpoint_sent(self, time_s: float) -> None:
         """A setpoint has left at `time_s`."""

@@ -20,7 +20,7 @@ from uasfly.messages import (
 
 @dataclass(slots=True)
 class VehicleView:
-    """Newest sample of each kind, and the answers and texts that came with the last step."""
+    """Last sample of each kind to arrive, and the answers and texts that came with the last step."""
 
     odometry: OdometrySample | None = None
     vehicle: VehicleSample | None = None
@@ -37,8 +37,7 @@ class VehicleView:
         for sample in samples:
             match sample:
                 case OdometrySample():
-                    if self.odometry is None or sample.time_s > self.odometry.time_s:
-                        self.odometry = sample
+                    self.odometry = sample
                 case VehicleSample():
                     self.vehicle = sample
                 case AttitudeTargetSample():
@@ -53,8 +52,8 @@ class VehicleView:
                     self.texts.append(sample)
 
     def odometry_age_s(self, time_s: float) -> float:
-        """Age of the newest odometry, infinite before the first."""
-        return math.inf if self.odometry is None else time_s - self.odometry.time_s
+        """Age of the last odometry, infinite before the first; one from the future is as wrong as one from the past."""
+        return math.inf if self.odometry is None else abs(time_s - self.odometry.time_s)
 
     @property
     def in_air(self) -> bool:

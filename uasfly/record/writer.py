@@ -15,10 +15,11 @@ from typing import IO, Any
 from mcap.writer import CompressionType, IndexType, Writer
 
 from uasfly import __version__
-from uasfly.errors import FileError
+from uasfly.errors import FileError, describe_error
 from uasfly.record.encode import json_schema, to_json
 
 FLUSH_INTERVAL_S = 0.5
+CLOSE_TIMEOUT_S = 10.0
 PROFILE = "uasfly"
 
 
@@ -109,6 +110,7 @@ class BackgroundLogWriter:
     def __init__(self, path: Path, description: dict[str, object]) -> None:
         """Open the file (see `LogWriter`) and start the thread."""
         self._writer = LogWriter(path, description)
+        self._problem = ""
         self._queue: queue.SimpleQueue[tuple[Any, float] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._run, name="flight log", daemon=True)
         self._thread.start()
@@ -121,19 +123,26 @@ class BackgroundLogWriter:
     @property
     def problem(self) -> str:
         """Why the log stopped, "" while it runs."""
-        return self._writer.problem
+        return self._problem or self._writer.problem
 
     def write(self, message: Any, log_time_s: float) -> None:
         """Hand one message over; returns at once."""
         self._queue.put((message, log_time_s))
 
     def close(self) -> None:
-        """Write what is left and close the file; safe to call twice."""
+        """Write what is left and close the file, in ten seconds at most; safe to call twice."""
         if self._thread.is_alive():
             self._queue.put(None)
-            self._thread.join()
+            self._thread.join(CLOSE_TIMEOUT_S)
+            if self._thread.is_alive():
+                self._problem = f"the flight log {self.path} breaks off: its disk is too slow"
 
     def _run(self) -> None:
         while (item := self._queue.get()) is not None:
-            self._writer.write(*item)
+            if self._problem:
+                continue
+            try:
+                self._writer.write(*item)
+            except Exception as error:
+                self._problem = f"the flight log {self.path} stopped: {describe_error(error)}"
         self._writer.close()

@@ -1,0 +1,44 @@
+"""Takes a reference from where the vehicle is to where it should be without a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from uasfly.messages import Array, ReferenceHorizon
+
+
+@dataclass(frozen=True, slots=True)
+class Glide:
+    """An offset that fades out: 1 - (10 s^3 - 15 s^4 + 6 s^5) over `duration_s`; two derivatives are continuous.
+
+    Attributes:
+        offset_m: (3,) where the vehicle is minus where the reference begins.
+        yaw_offset_rad: the same for yaw.
+        start_s: when it begins, on the clock of the reference's times.
+        duration_s: how long it takes.
+    """
+
+    offset_m: Array
+    yaw_offset_rad: float
+    start_s: float
+    duration_s: float
+
+    def onto(self, reference: ReferenceHorizon) -> ReferenceHorizon:
+        """The reference with the rest of the offset added; the same object once it has faded out."""
+        times = reference.time_s
+        if float(times[0]) >= self.start_s + self.duration_s:
+            return reference
+        s = np.clip((times - self.start_s) / self.duration_s, 0.0, 1.0)
+        share = 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        speed = -30.0 * s**2 * (1.0 - s) ** 2 / self.duration_s
+        acceleration = -60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / self.duration_s**2
+        return ReferenceHorizon(
+            times,
+            reference.position_in_world + np.outer(share, self.offset_m),
+            reference.velocity_in_world + np.outer(speed, self.offset_m),
+            reference.acceleration_in_world + np.outer(acceleration, self.offset_m),
+            reference.yaw_rad + share * self.yaw_offset_rad,
+            reference.yaw_rate_rad_s + speed * self.yaw_offset_rad,
+        )
