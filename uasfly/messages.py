@@ -8,6 +8,7 @@ Every sample carries the time at which it was true, in seconds of the host's mon
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -109,6 +110,12 @@ class HealthSample:
     horizontal_accuracy_m: float
 
 
+class LinkEvent(enum.Enum):
+    """Events of the link; silence is no event, the age of what has arrived tells it."""
+
+    REBOOTED = "rebooted"  # the vehicle's clock went back
+
+
 @dataclass(frozen=True, slots=True)
 class TextSample:
     """A status text from the vehicle; severity as in MAVLink (0 emergency .. 7 debug)."""
@@ -116,6 +123,14 @@ class TextSample:
     time_s: float
     severity: int
     text: str
+
+
+@dataclass(frozen=True, slots=True)
+class LinkSample:
+    """What the link itself has noticed about the vehicle."""
+
+    time_s: float
+    event: LinkEvent
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +189,7 @@ Sample = (
     | VehicleSample
     | HealthSample
     | TextSample
+    | LinkSample
     | TruthSample
     | RequestResult
 )
@@ -245,6 +261,61 @@ class Phase(enum.Enum):
     ABORTED = "aborted"
 
 
+class Action(enum.Enum):
+    """What a monitor has done about something, from the mildest to the last."""
+
+    NOTHING = "nothing"
+    WARN = "warn"  # tell the pilot
+    SLOW_DOWN = "slow_down"  # fly on at a fraction of the speed while it lasts
+    HOLD = "hold"  # stop on the path while it lasts, then fly on
+    BACK_OFF = "back_off"  # fly back along the way it came while it lasts, then wait there
+    END = "end"  # leave the mission: hold, then the mission's own ending
+    RETURN = "return"  # leave the mission: PX4's return
+    LAND = "land"  # leave the mission: land here
+    HAND_OVER = "hand_over"  # stop sending, ask PX4 for hold: the pilot has it
+
+    @property
+    def grade(self) -> int:
+        """0 for nothing, growing; of several alarms the one with the highest grade acts."""
+        return _GRADES[self]
+
+
+_GRADES = {action: grade for grade, action in enumerate(Action)}
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """A monitor's finding that lasts.
+
+    Attributes:
+        monitor: its name, as in the mission file's section `monitors`.
+        action: what is to be done about it now.
+        severity: as in MAVLink, 0 emergency .. 7 debug.
+        text: for the pilot, with numbers; it stays the same while the alarm's action does.
+    """
+
+    monitor: str
+    action: Action
+    severity: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Authority:
+    """How much of what tilt and thrust can give the wind has taken, 0 none .. 1 all (more: it cannot be held).
+
+    Attributes:
+        horizontal, vertical: shares, the present force.
+        peak: the larger share that is to be expected soon (recent gusts and trend).
+        homeward: share that flying home at the mission's transition speed would take.
+    """
+
+    horizontal: float
+    vertical: float
+    peak: float
+    homeward: float
+
+
 @dataclass(frozen=True, slots=True)
 class Status:
     """What a step has to say, for the live view, the log and the summary.
@@ -257,6 +328,12 @@ class Status:
         reason: why the flight ended early, "" otherwise.
         fallback: name of what replaced the solver's answer in this step, "" when nothing did.
         announcements: new texts for the pilot, with their severity as in MAVLink.
+        mode, armed: the vehicle's, as last heard.
+        battery_remaining, battery_voltage_v: NaN where unknown.
+        telemetry_age_s: of the last odometry; infinite before the first.
+        authority: None until there is an estimate.
+        alarms: what the monitors find now. action: the highest of theirs, which is being done.
+        pace: rate at which the mission's own time runs: 1 as planned, 0 held, negative on the way back.
     """
 
     time_s: float
@@ -269,3 +346,12 @@ class Status:
     fallback: str = ""
     reason: str = ""
     announcements: tuple[tuple[int, str], ...] = field(default=())
+    mode: FlightMode = FlightMode.OTHER
+    armed: bool = False
+    battery_remaining: float = math.nan
+    battery_voltage_v: float = math.nan
+    telemetry_age_s: float = math.inf
+    authority: Authority | None = None
+    alarms: tuple[Alarm, ...] = ()
+    action: Action = Action.NOTHING
+    pace: float = 1.0

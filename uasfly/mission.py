@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from uasfly.airframe import FileModel
+from uasfly.monitor_settings import MonitorSettings
 
 Coordinate = Annotated[float, Field(ge=-10_000.0, le=10_000.0, allow_inf_nan=False)]
 Point = tuple[Coordinate, Coordinate, Coordinate]
@@ -246,6 +247,7 @@ class Mission(FileModel):
     yaw: YawRule = FixedYaw(yaw_deg=0.0)
     ending: Ending = Ending()
     limits: MissionLimits = MissionLimits()
+    monitors: MonitorSettings = MonitorSettings()
 
     def yaw_rule(self, leg: int) -> FixedYaw | PathYaw | FacingYaw:
         """The yaw rule of a leg: its own or the mission's."""
