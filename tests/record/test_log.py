@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -178,6 +179,22 @@ def test_a_full_disk_stops_the_log_but_raises_nothing() -> None:
         writer.write(_odometry(0.01 * k), 0.01 * k)
     writer.close()
     assert "No space left" in writer.problem
+
+
+def test_a_log_that_somebody_removes_is_told_and_written_on(tmp_path: Path) -> None:
+    """The folder goes in flight: within a second `problem` says so; a second link to the file has everything."""
+    folder, kept = tmp_path / "logs", tmp_path / "kept.mcap"
+    folder.mkdir()
+    writer = LogWriter(folder / "flight.mcap", {})
+    writer.write(_odometry(0.0), 0.0)
+    assert writer.problem == ""
+    os.link(writer.path, kept)
+    shutil.rmtree(folder)
+    for time_s in (0.4, 0.8, 1.2):
+        writer.write(_odometry(time_s), time_s)
+    writer.close()
+    assert "is gone" in writer.problem
+    assert len(list(LogReader(kept).messages())) == 4
 
 
 def test_background_writer_writes_everything(tmp_path: Path) -> None:

@@ -20,6 +20,8 @@ from uasfly.messages import (
     TruthSample,
     VehicleSample,
 )
+from uasfly.sim.faults import Fault
+from uasfly.sim.link_faults import LinkFaults
 from uasfly.sim.sensors import GnssSample, InertialSample
 
 YAW_RAD = 0.3
@@ -50,6 +52,12 @@ class FakeVehicle:
         self.takeoff_height_m = math.nan
         self.refusal = ""
         self.texts: list[TextSample] = []
+        self.boots = 1
+        self.link_faults = LinkFaults(np.random.default_rng(0))
+        self.injected: list[Fault] = []
+
+    def inject(self, fault: Fault) -> None:
+        self.injected.append(fault)
 
     def advance_to(self, time_s: float) -> None:
         self.time_s = round(time_s / self.step_s) * self.step_s

@@ -22,6 +22,9 @@ def sim(
 ) -> None:
     """Run the simulated PX4 vehicle in real time until Ctrl-C.
 
+    While it runs it reads faults from its standard input, a line each, for example
+    [bold]{kind: gnss_lost, duration_s: 20}[/] (kinds: see `uasfly schema scenario`, faults).
+
     Example: [bold]uasfly sim --airframe f550 --scenario gusty[/], then in another terminal
     [bold]uasfly hover --connect udpin://0.0.0.0:14540[/]
     """

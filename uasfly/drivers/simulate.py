@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import threading
 from collections.abc import Callable
+from queue import SimpleQueue
 
 from uasfly.airframe import Airframe
 from uasfly.errors import UasflyError
 from uasfly.files import find_file, load_file
+from uasfly.sim.fault_lines import FaultLines
+from uasfly.sim.faults import Fault
 from uasfly.sim.mavlink.server import ServerReport, serve
 from uasfly.sim.plant import Plant
 from uasfly.sim.scenario import Scenario
@@ -16,7 +21,7 @@ from uasfly.sim.vehicle import SimulatedVehicle
 def simulate(
     airframe: str, scenario: str, seed: int, *, remote: str, port: int, system_id: int, say: Callable[[str], None]
 ) -> ServerReport:
-    """Serve a vehicle in real time until SIGINT or SIGTERM.
+    """Serve a vehicle in real time until SIGINT or SIGTERM; faults are read from standard input, a line each.
 
     Args:
         airframe: name of a shipped file or a path; it names the plant.
@@ -40,4 +45,16 @@ def simulate(
     def ready(local_port: int) -> None:
         say(f"simulated {plant.name} in {scenario}: sends to udp {host}:{remote_port}, listens on {local_port}")
 
-    return serve(vehicle, (host, int(remote_port)), port, system_id, None, ready)
+    injected: SimpleQueue[Fault] = SimpleQueue()
+    threading.Thread(target=_listen, args=(injected, say), name="faults", daemon=True).start()
+    return serve(vehicle, (host, int(remote_port)), port, system_id, None, ready, injected)
+
+
+def _listen(injected: SimpleQueue[Fault], say: Callable[[str], None]) -> None:
+    """Take faults from standard input until it ends; the vehicle flies on without it."""
+    lines = FaultLines(injected.put, say)
+    try:
+        while data := os.read(0, 4096):
+            lines.feed(data)
+    except OSError:  # no standard input
+        return

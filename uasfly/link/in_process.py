@@ -10,7 +10,8 @@ import heapq
 import itertools
 import math
 from collections.abc import Sequence
-from typing import Protocol
+from dataclasses import replace
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from uasfly.messages import (
     BatterySample,
     FlightMode,
     HealthSample,
+    LinkEvent,
+    LinkSample,
     OdometrySample,
     Request,
     RequestKind,
@@ -29,6 +32,7 @@ from uasfly.messages import (
     Sample,
     Setpoint,
     TextSample,
+    TruthSample,
     VehicleSample,
 )
 
@@ -36,8 +40,9 @@ ODOMETRY_RATE_HZ = 100.0
 ATTITUDE_TARGET_RATE_HZ = 50.0
 STATE_RATE_HZ = 2.0
 BATTERY_RATE_HZ = 1.0
-HEALTH_RATE_HZ = 1.0
+HEALTH_RATE_HZ = 5.0
 ANSWER_LATENCY_S = 0.01
+SAME_CLOCK_S = 0.02  # the vehicle stops at its last whole step before a time
 
 _MODES = {
     RequestKind.TAKEOFF: FlightMode.TAKEOFF,
@@ -48,12 +53,41 @@ _MODES = {
 }
 
 
+AnySample = TypeVar("AnySample", bound=Sample)
+
+
+class MessageFaults(Protocol):
+    """What a bad link does to messages; see `uasfly.sim.link_faults`."""
+
+    def telemetry(self) -> tuple[float, ...]:
+        """Delays [s] of the copies of one message from the vehicle that get through."""
+        ...
+
+    def command(self, is_setpoint: bool) -> tuple[float, ...]:
+        """The same for one message to the vehicle."""
+        ...
+
+    def acknowledgement(self) -> int | None:
+        """A result that the next command is answered with instead of the true one."""
+        ...
+
+
 class DirectVehicle(Protocol):
     """What this end needs of a simulated vehicle; times are the vehicle's, which here are also the host's."""
 
     @property
     def time_s(self) -> float:
         """Time since boot [s]."""
+        ...
+
+    @property
+    def boots(self) -> int:
+        """How often it has started."""
+        ...
+
+    @property
+    def link_faults(self) -> MessageFaults:
+        """What the link does to messages now."""
         ...
 
     def advance_to(self, time_s: float) -> None:
@@ -100,6 +134,10 @@ class DirectVehicle(Protocol):
         """Estimator and GNSS, now."""
         ...
 
+    def truth(self) -> TruthSample:
+        """The true state, now."""
+        ...
+
     def take_texts(self) -> Sequence[TextSample]:
         """Status texts since the last call."""
         ...
@@ -125,10 +163,14 @@ class InProcessLink:
         self._arrivals: list[tuple[float, int, Sample]] = []
         self._commands: list[tuple[float, int, Setpoint | Request]] = []
         self._now_s = vehicle.time_s
+        self._ahead_s = 0.0  # host time minus vehicle time: the vehicle's clock may jump, and starts anew with it
+        self._boots = vehicle.boots
+        state = vehicle.state()
+        self._said = (state.mode, state.armed, state.in_air)  # last told
         self._ticks = [
             _Tick(1.0 / ODOMETRY_RATE_HZ, vehicle.odometry),
             _Tick(1.0 / ATTITUDE_TARGET_RATE_HZ, vehicle.attitude_target),
-            _Tick(1.0 / STATE_RATE_HZ, vehicle.state),
+            _Tick(1.0 / STATE_RATE_HZ, self._state),
             _Tick(1.0 / BATTERY_RATE_HZ, vehicle.battery),
             _Tick(1.0 / HEALTH_RATE_HZ, vehicle.health),
         ]
@@ -140,15 +182,16 @@ class InProcessLink:
             due = min(next_tick.due_s, self._commands[0][0] if self._commands else math.inf)
             if due > time_s:
                 break
-            self._vehicle.advance_to(due)
+            self._advance_vehicle(due)
             if self._commands and self._commands[0][0] <= next_tick.due_s:
                 self._deliver(heapq.heappop(self._commands)[2])
             else:
                 self._arrive(next_tick.read())
                 next_tick.count += 1
+            self._tell_changes()
             for text in self._vehicle.take_texts():
                 self._arrive(text)
-        self._vehicle.advance_to(time_s)
+        self._advance_vehicle(time_s)
         self._now_s = time_s
 
     def poll(self) -> tuple[Sample, ...]:
@@ -158,21 +201,62 @@ class InProcessLink:
             arrived.append(heapq.heappop(self._arrivals)[2])
         return tuple(arrived)
 
-    def send(self, setpoint: Setpoint) -> None:
+    def send(self, setpoint: Setpoint) -> bool:
         """Send one setpoint; it acts after the command latency. See `check_setpoint` for what is refused."""
         check_setpoint(setpoint)
-        heapq.heappush(self._commands, (self._now_s + self._command_latency(), next(self._order), setpoint))
+        for delay_s in self._vehicle.link_faults.command(is_setpoint=True):
+            due_s = self._now_s + self._command_latency() + delay_s
+            heapq.heappush(self._commands, (due_s, next(self._order), setpoint))
+        return True
+
+    def send_text(self, severity: int, text: str) -> None:
+        """Texts to the ground station go nowhere: a rehearsal has none."""
 
     def request(self, request: Request) -> None:
         """Ask the vehicle; the answer arrives as a RequestResult."""
-        heapq.heappush(self._commands, (self._now_s + self._command_latency(), next(self._order), request))
+        for delay_s in self._vehicle.link_faults.command(is_setpoint=False):
+            due_s = self._now_s + self._command_latency() + delay_s
+            heapq.heappush(self._commands, (due_s, next(self._order), request))
+
+    def truth(self) -> TruthSample:
+        """The true state now, on the host's clock; no link has it."""
+        return self._stamped(self._vehicle.truth())
+
+    def _advance_vehicle(self, time_s: float) -> None:
+        """Let the vehicle run until a host time; its clock may jump on the way."""
+        vehicle = self._vehicle
+        wanted_s = time_s - self._ahead_s
+        vehicle.advance_to(wanted_s)
+        if not -SAME_CLOCK_S < wanted_s - vehicle.time_s < SAME_CLOCK_S:
+            self._ahead_s += wanted_s - vehicle.time_s
+        if vehicle.boots != self._boots:
+            self._boots = vehicle.boots
+            self._arrive(LinkSample(vehicle.time_s, LinkEvent.REBOOTED))
+
+    def _state(self) -> VehicleSample:
+        state = self._vehicle.state()
+        self._said = (state.mode, state.armed, state.in_air)
+        return state
+
+    def _tell_changes(self) -> None:
+        """PX4 tells a new mode at once."""
+        state = self._vehicle.state()
+        if (state.mode, state.armed, state.in_air) != self._said:
+            self._arrive(self._state())
 
     def _command_latency(self) -> float:
         return self._command_latency_s + self._jitter_s * float(self._rng.random())
 
     def _arrive(self, sample: Sample) -> None:
-        latency = self._telemetry_latency_s + self._jitter_s * float(self._rng.random())
-        heapq.heappush(self._arrivals, (self._vehicle.time_s + latency, next(self._order), sample))
+        sample = self._stamped(sample)
+        for delay_s in self._vehicle.link_faults.telemetry():
+            latency = self._telemetry_latency_s + self._jitter_s * float(self._rng.random()) + delay_s
+            due_s = self._vehicle.time_s + self._ahead_s + latency
+            heapq.heappush(self._arrivals, (due_s, next(self._order), sample))
+
+    def _stamped(self, sample: AnySample) -> AnySample:
+        """The sample on the host's clock, as the MAVSDK end maps it."""
+        return sample if self._ahead_s == 0.0 else replace(sample, time_s=sample.time_s + self._ahead_s)
 
     def _deliver(self, command: Setpoint | Request) -> None:
         vehicle = self._vehicle
@@ -189,9 +273,13 @@ class InProcessLink:
                 if command.kind is RequestKind.TAKEOFF:
                     vehicle.set_takeoff_height(command.height_m)
                 accepted, text = vehicle.set_mode(_MODES[command.kind])
-        arrival = self._vehicle.time_s + ANSWER_LATENCY_S
-        result = RequestResult(self._vehicle.time_s, command, accepted, text)
-        heapq.heappush(self._arrivals, (arrival, next(self._order), result))
+        odd = vehicle.link_faults.acknowledgement()
+        if odd is not None:
+            accepted, text = False, f"refused with result {odd}"
+        now_s = vehicle.time_s + self._ahead_s
+        result = RequestResult(now_s, command, accepted, text)
+        for delay_s in vehicle.link_faults.telemetry():
+            heapq.heappush(self._arrivals, (now_s + ANSWER_LATENCY_S + delay_s, next(self._order), result))
 
 
 class _Tick:

@@ -26,10 +26,11 @@ from uasfly.link.slots import Slot, WakeUp
 from uasfly.link.timesync import TimeSync
 from uasfly.link.upkeep import WARNING, Upkeep
 from uasfly.link.urls import ConnectionUrl, parse_url
-from uasfly.messages import Request, Sample, Setpoint, TextSample
+from uasfly.messages import LinkEvent, LinkSample, Request, Sample, Setpoint, TextSample
 
 SETTLING_S = 1.0  # `connect` waits this long for the first time exchanges and message intervals
 SETTLED_EXCHANGES = 5
+LONGEST_SETPOINT_AGE_S = 0.2
 
 EVENTS_MIN_BAUD = 230400  # the texts of PX4's events are some 100 kB to fetch, once
 KEPT = {"STATUSTEXT": 64, "ODOMETRY": 16, "ATTITUDE_TARGET": 16, "DEBUG_FLOAT_ARRAY": 16, "HIL_STATE_QUATERNION": 16}
@@ -51,6 +52,7 @@ class MavsdkLink:
         self._url = url
         self._closed = False
         self._awaited = False
+        self._stale_setpoints = 0
         self._fresh = asyncio.Event()
         self._synchronised = asyncio.Event()
         self._clock = ClockMap()
@@ -58,7 +60,7 @@ class MavsdkLink:
         self._decoder = Decoder(self._clock)
         self._events = EventFeed()
         self._echoes = EchoFilter()
-        self._own_texts: list[TextSample] = []
+        self._own_samples: list[TextSample | LinkSample] = []
         self._text_ids = itertools.cycle(range(1, 0x10000))
         self._commands = CommandChannel(bridge.send, bridge.system_id)
         self._parameters = ParameterChannel(bridge.send, bridge.system_id)
@@ -133,14 +135,18 @@ class MavsdkLink:
             if self._echoes.passes(sample, source):
                 self._desk.hear(sample)
                 samples.append(sample)
-        samples.extend(self._own_texts)
-        self._own_texts.clear()
+        samples.extend(self._own_samples)
+        self._own_samples.clear()
         while self._desk.results:
             samples.append(self._desk.results.popleft())
         return tuple(samples)
 
-    def send(self, setpoint: Setpoint) -> None:
+    def send(self, setpoint: Setpoint) -> bool:
         """Send one setpoint, once: attitude, thrust and yaw rate as feed-forward.
+
+        Returns:
+            False where it was made longer than LONGEST_SETPOINT_AGE_S ago: it stays here, counted in `losses`. A
+            program that was stopped in the middle of a cycle must not begin with what it was about to say then.
 
         Raises:
             ValueError: when a field is not finite or the thrust is outside 0..1: such a setpoint never leaves.
@@ -150,7 +156,12 @@ class MavsdkLink:
             check_setpoint(setpoint)
             raise LinkError(f"{self._url}: the link is closed")
         vehicle_s = self._clock.to_vehicle(setpoint.time_s)
-        self._bridge.send("SET_ATTITUDE_TARGET", attitude_target(setpoint, self._bridge.system_id, vehicle_s))
+        fields = attitude_target(setpoint, self._bridge.system_id, vehicle_s)
+        if time.monotonic() - setpoint.time_s > LONGEST_SETPOINT_AGE_S:
+            self._stale_setpoints += 1
+            return False
+        self._bridge.send("SET_ATTITUDE_TARGET", fields)
+        return True
 
     def request(self, request: Request) -> None:
         """Ask the vehicle for something; the answer comes as a RequestResult in a later `poll`.
@@ -231,6 +242,8 @@ class MavsdkLink:
         """What was lost, by cause: unusable messages, messages that `poll` came too late for, sends that failed."""
         lost = {f"{name} unusable": count for name, count in self._decoder.dropped.items()}
         lost.update({f"{slot.name} overrun": slot.overrun for slot in self._slots() if slot.overrun})
+        if self._stale_setpoints:
+            lost["stale setpoints"] = self._stale_setpoints
         if self._bridge.send_errors:
             lost["send errors"] = self._bridge.send_errors
         return lost
@@ -278,16 +291,17 @@ class MavsdkLink:
     def _take_time(self, fields: dict[str, Any], arrival_s: float) -> None:
         if self._time_sync.receive(fields, arrival_s):
             self._say(WARNING, "the vehicle has restarted; its clock and message rates are set up again")
+            self._own_samples.append(LinkSample(time.monotonic(), LinkEvent.REBOOTED))
             self._upkeep.ask_for_streams()
         if self._clock.exchanges >= SETTLED_EXCHANGES:
             self._synchronised.set()
 
     def _something_waits(self) -> bool:
-        return bool(self._own_texts or self._desk.results or self._events or any(self._sample_slots.values()))
+        return bool(self._own_samples or self._desk.results or self._events or any(self._sample_slots.values()))
 
     def _say(self, severity: int, text: str) -> None:
         _log.info("%s", text)  # no warning: that would go to a terminal on which somebody draws
-        self._own_texts.append(TextSample(time.monotonic(), severity, text))
+        self._own_samples.append(TextSample(time.monotonic(), severity, text))
         self._fresh.set()
 
 

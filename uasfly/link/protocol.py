@@ -14,8 +14,8 @@ class VehicleLink(Protocol):
         """Samples that have arrived since the last call, oldest first; never blocks."""
         ...
 
-    def send(self, setpoint: Setpoint) -> None:
-        """Send one setpoint, once.
+    def send(self, setpoint: Setpoint) -> bool:
+        """Send one setpoint, once; False where it is too old to leave.
 
         Raises:
             ValueError: when a field is not finite or the thrust is outside 0..1: such a setpoint never leaves.
@@ -24,4 +24,8 @@ class VehicleLink(Protocol):
 
     def request(self, request: Request) -> None:
         """Ask the vehicle for something; the answer comes as a RequestResult in a later `poll`."""
+        ...
+
+    def send_text(self, severity: int, text: str) -> None:
+        """Send a status text for the ground station; severity as in MAVLink, 0 emergency .. 7 debug."""
         ...

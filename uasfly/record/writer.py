@@ -1,12 +1,14 @@
 """The flight log: an MCAP file with one JSON channel a message type, complete up to the last second whatever happens.
 
 Every half second of log time the chunk in progress is closed and handed to the operating system, so a killed process
-loses at most that. A full disk or a vanished folder stops the log, never the flight: `problem` then says why.
+loses at most that. A full disk stops the log, never the flight: `problem` then says why. A file that somebody has
+removed is written on (whoever still holds it open has it) and `problem` says that it is gone.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import queue
 import threading
 from pathlib import Path
@@ -51,6 +53,7 @@ class LogWriter:
             ) from error
         self.path = path
         self.problem = ""
+        self._stopped = False
         self._channels: dict[type[Any], int] = {}
         self._last_flush_s = -1e9
         self._writer: Any = Writer(
@@ -64,7 +67,7 @@ class LogWriter:
 
     def write(self, message: Any, log_time_s: float) -> None:
         """Append one message; `log_time_s` is the step in which uasfly saw it (host time)."""
-        if self.problem:
+        if self._stopped:
             return
         try:
             channel = self._channels.get(type(message))
@@ -75,6 +78,7 @@ class LogWriter:
             if log_time_s - self._last_flush_s >= FLUSH_INTERVAL_S:
                 self._writer.flush()
                 self._last_flush_s = log_time_s
+                self._look_for_file()
         except OSError as error:
             self._give_up(error)
 
@@ -83,7 +87,7 @@ class LogWriter:
         if self._stream.closed:
             return
         try:
-            if not self.problem:
+            if not self._stopped:
                 self._writer.finish()
         except OSError as error:
             self._give_up(error)
@@ -100,7 +104,19 @@ class LogWriter:
         self._channels[message_type] = channel
         return channel
 
+    def _look_for_file(self) -> None:
+        """A removed file takes everything without an error, and nobody ever finds it."""
+        if self.problem:
+            return
+        try:
+            there = os.path.samestat(self.path.stat(), os.fstat(self._stream.fileno()))
+        except OSError:
+            there = False
+        if not there:
+            self.problem = f"the flight log {self.path} is gone: the file or its folder was moved or removed"
+
     def _give_up(self, error: OSError) -> None:
+        self._stopped = True
         self.problem = f"the flight log {self.path} stopped: {error.strerror or error}"
 
 

@@ -1,4 +1,4 @@
-"""Scenario files: the wind, the sensors and the link that a simulated flight meets.
+"""Scenario files: the wind, the sensors, the link and the faults that a simulated flight meets.
 
 PX4-like noise comes from PX4's own simulator (SIH quad, main of August 2026): its estimate against ground truth over
 90 s of excitation. Beside small white noise every quantity wanders slowly (1/e correlation 2-6 s): velocity by
@@ -14,6 +14,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from uasfly.airframe import FileModel, NonNegative, Positive
+from uasfly.sim.faults import Fault
 from uasfly.sim.wind.settings import Vector, WindSettings
 
 Delay = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -101,3 +102,4 @@ class Scenario(FileModel):
     wind: WindSettings = WindSettings()
     sensors: Sensors = Sensors(position="mocap", position_noise_m=0.01)
     link: Link = Link()
+    faults: Annotated[tuple[Fault, ...], Field(max_length=200, description="what goes wrong, and when")] = ()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from array import array
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,6 +27,9 @@ from uasfly.sim.autopilot import Autopilot
 from uasfly.sim.battery import Battery
 from uasfly.sim.dynamics import STEP_S, PlantDynamics
 from uasfly.sim.estimate import Estimate
+from uasfly.sim.fault_board import FaultBoard, check_motors
+from uasfly.sim.faults import Fault
+from uasfly.sim.link_faults import LinkFaults
 from uasfly.sim.parameters import ParameterTable
 from uasfly.sim.plant import Plant
 from uasfly.sim.scenario import Scenario
@@ -33,6 +37,7 @@ from uasfly.sim.sensors import GnssSample, InertialSample, RawSensors
 from uasfly.sim.wind.field import WindField
 
 _OUTER_STEPS = 2  # position control at 125 Hz, as PX4's local position
+_STILL = (0.0, 0.0, 0.0)
 _SLOW_STEPS = 10  # commander, land detector and battery at 25 Hz
 
 
@@ -46,8 +51,11 @@ class SimulatedVehicle:
         start_position: (x, y, z) [m] where it stands; the ground is at z = 0.
         start_yaw_rad: its heading there.
 
+    Raises:
+        UasflyError: a fault of the scenario is none of this vehicle.
+
     Attributes:
-        step_s: length of a step. parameters: PX4's parameters, name -> (type, value).
+        step_s: length of a step. parameters: PX4's parameters, name -> (type, value). boots: how often it has started.
     """
 
     step_s = STEP_S
@@ -60,36 +68,78 @@ class SimulatedVehicle:
         start_position: tuple[float, float, float] = (0.0, 0.0, 0.0),
         start_yaw_rad: float = 0.0,
     ) -> None:
-        wind_seed, estimate_seed, sensor_seed = np.random.SeedSequence(seed).spawn(3)
+        self._seeds = np.random.SeedSequence(seed)
+        wind_seed, estimate_seed, sensor_seed, fault_seed = self._seeds.spawn(4)
         self.parameters = ParameterTable(plant.parameters)
         self._dynamics = PlantDynamics(plant, STEP_S)
         self._dynamics.place(start_position, math.cos(0.5 * start_yaw_rad), math.sin(0.5 * start_yaw_rad))
+        check_motors(scenario.faults, len(self._dynamics.targets))
         self._state = self._dynamics.state
         self._wind = WindField(scenario.wind, np.random.default_rng(wind_seed), STEP_S)
         self._battery = Battery(plant)
-        self._estimate = Estimate(scenario.sensors, np.random.default_rng(estimate_seed), self._state, STEP_S)
+        self._plant = plant
+        self._scenario = scenario
+        self._steps = self._boot_steps = 0
+        self._jumped_s = 0.0
+        self._quality: tuple[float, int] | None = None
+        self.boots = 0
+        self._faults = FaultBoard(self, scenario.faults, np.random.default_rng(fault_seed))
+        self._boot(estimate_seed, sensor_seed)
+
+    def _boot(self, estimate_seed: np.random.SeedSequence, sensor_seed: np.random.SeedSequence) -> None:
+        """Start the autopilot with what it does not keep: estimate, modes, biases of its sensors."""
+        self.boots += 1
+        self._boot_steps, self._jumped_s = self._steps, 0.0
+        self._estimate = Estimate(self._scenario.sensors, np.random.default_rng(estimate_seed), self._state, STEP_S)
         self._sensors = RawSensors(
             np.random.default_rng(sensor_seed), self._state, self._dynamics.acceleration, self._estimate
         )
         self._autopilot = Autopilot(
-            plant.rotors, self.parameters, self._dynamics, self._estimate, _OUTER_STEPS * STEP_S, _SLOW_STEPS * STEP_S
+            self._plant.rotors,
+            self.parameters,
+            self._dynamics,
+            self._estimate,
+            _OUTER_STEPS * STEP_S,
+            _SLOW_STEPS * STEP_S,
         )
-        self._steps = 0
 
     @property
     def time_s(self) -> float:
         """Vehicle time of the last step."""
-        return self._steps * STEP_S
+        return self._since_boot_s + self._jumped_s
+
+    @property
+    def _since_boot_s(self) -> float:
+        """What the autopilot reckons with; a jump of the clock moves only what it tells."""
+        return (self._steps - self._boot_steps) * STEP_S
+
+    @property
+    def link_faults(self) -> LinkFaults:
+        """What the link does to messages now."""
+        return self._faults.link
+
+    def inject(self, fault: Fault) -> None:
+        """Let a fault begin now.
+
+        Raises:
+            UasflyError: it is none of this vehicle.
+        """
+        check_motors((fault,), len(self._dynamics.targets))
+        self._faults.begin(fault)
 
     def advance_to(self, time_s: float) -> None:
         """Simulate up to the last whole step at or before `time_s`; does nothing for times past."""
-        target = math.floor(time_s / STEP_S + 1e-6)
+        target = self._boot_steps + math.floor((time_s - self._jumped_s) / STEP_S + 1e-6)
         while self._steps < target:
             self._step()
 
     def _step(self) -> None:
+        if self._steps % _SLOW_STEPS == 0 and not self._faults.idle:
+            engaged = self._autopilot.engaged_at_s
+            boot_s = self._boot_steps * STEP_S
+            self._faults.update(self._steps * STEP_S, None if engaged is None else engaged + boot_s)
         steps, state, dynamics, autopilot = self._steps, self._state, self._dynamics, self._autopilot
-        now = steps * STEP_S
+        now = self._since_boot_s
         if steps % _SLOW_STEPS == 0:
             self._battery.draw(state[13:], _SLOW_STEPS * STEP_S)
             autopilot.full_speed_rad_s = self._battery.full_speed_rad_s()
@@ -100,7 +150,11 @@ class SimulatedVehicle:
         x, y, z, vx, vy, vz = state[0:6]
         engaged = autopilot.engaged_at_s
         air = self._wind.step((x, y, z), (vx, vy, vz), None if engaged is None else now - engaged)
-        dynamics.wind[:] = array("d", air.free_in_world + air.jet_in_world)
+        free = air.free_in_world
+        if self._faults.wind != _STILL:
+            east, north, up = self._faults.wind
+            free = (free[0] + east, free[1] + north, free[2] + up)
+        dynamics.wind[:] = array("d", free + air.jet_in_world)
         dynamics.step()
         self._steps = steps + 1
         self._estimate.advance()
@@ -125,19 +179,19 @@ class SimulatedVehicle:
                 f"expected a finite attitude target, found {quaternion_body_to_world}, {thrust}, {yaw_rate_rad_s}"
             )
         attitude = (w / length, x / length, y / length, z / length)
-        self._autopilot.take_setpoint(self.time_s, attitude, min(1.0, max(0.0, thrust)), yaw_rate)
+        self._autopilot.take_setpoint(self._since_boot_s, attitude, min(1.0, max(0.0, thrust)), yaw_rate)
 
     def set_mode(self, mode: FlightMode) -> tuple[bool, str]:
         """Ask for a mode; whether it was granted, and why not."""
-        return self._autopilot.set_mode(mode, self.time_s, self._battery.charge)
+        return self._autopilot.set_mode(mode, self._since_boot_s, self._battery.charge)
 
     def arm(self) -> tuple[bool, str]:
         """Ask to arm; whether it was granted, and why not."""
-        return self._autopilot.arm(self.time_s, self._battery.charge)
+        return self._autopilot.arm(self._since_boot_s, self._battery.charge)
 
     def disarm(self, forced: bool = False) -> tuple[bool, str]:
         """Ask to disarm; in the air only when `forced`."""
-        return self._autopilot.disarm(self.time_s, self._battery.charge, forced)
+        return self._autopilot.disarm(self._since_boot_s, self._battery.charge, forced)
 
     def set_takeoff_height(self, height_m: float) -> None:
         """Set the height above home that the next take-off climbs to, in the place of MIS_TAKEOFF_ALT."""
@@ -150,6 +204,10 @@ class SimulatedVehicle:
     def set_gnss_offset(self, offset_in_world: tuple[float, float, float]) -> None:
         """Shift all positions that the source gives from now on [m]."""
         self._estimate.gnss_offset = offset_in_world
+
+    def set_gnss_quality(self, quality: tuple[float, int] | None) -> None:
+        """Let GNSS tell this horizontal accuracy [m] and number of satellites, None for what they are."""
+        self._quality = quality
 
     def set_motor_effectiveness(self, motor: int, effectiveness: float) -> None:
         """Let a motor (0 is the first) give this share of its thrust, 1 when it is sound."""
@@ -164,9 +222,20 @@ class SimulatedVehicle:
         self._autopilot.commander.refuse_arming = arming
         self._autopilot.commander.refuse_offboard = offboard
 
+    def reboot(self) -> None:
+        """Start the autopilot again, in flight too: the motors stop, its clock is at zero, its parameters stay."""
+        estimate_seed, sensor_seed = self._seeds.spawn(2)
+        self._boot(estimate_seed, sensor_seed)
+        self._dynamics.targets[:] = array("d", [0.0] * len(self._dynamics.targets))
+
+    def jump_clock(self, step_s: float) -> None:
+        """Move the clock that stamps telemetry; nothing else notices."""
+        self._jumped_s += step_s
+
     def odometry(self) -> OdometrySample:
         """The estimate of position, velocity, attitude and rates."""
-        return self._estimate.odometry(self.time_s)
+        sample = self._estimate.odometry(self.time_s)
+        return self._faults.distorted(sample) if self._faults.distorts else sample
 
     def truth(self) -> TruthSample:
         """The true state, and what the wind does."""
@@ -193,8 +262,10 @@ class SimulatedVehicle:
         """Estimator and GNSS."""
         estimate = self._estimate
         fix, satellites = (3, 10) if estimate.gnss_available else (0, 0)
-        ok = estimate.position_ok
-        return HealthSample(self.time_s, ok, ok, estimate.attitude_ok, fix, satellites, estimate.horizontal_accuracy_m)
+        ok, accuracy = estimate.position_ok, estimate.horizontal_accuracy_m
+        if self._quality is not None and fix:
+            accuracy, satellites = max(accuracy, self._quality[0]), self._quality[1]
+        return HealthSample(self.time_s, ok, ok, estimate.attitude_ok, fix, satellites, accuracy)
 
     def attitude_target(self) -> AttitudeTargetSample:
         """What the attitude controller is asked for, by whichever mode flies."""
@@ -207,7 +278,13 @@ class SimulatedVehicle:
 
     def gnss(self) -> GnssSample:
         """GNSS receiver."""
-        return self._sensors.gnss(self.time_s)
+        sample = self._sensors.gnss(self.time_s)
+        if self._quality is None or not sample.fix:
+            return sample
+        accuracy, satellites = self._quality
+        return replace(
+            sample, satellites=satellites, horizontal_accuracy_m=accuracy, vertical_accuracy_m=2.0 * accuracy
+        )
 
     def take_texts(self) -> list[TextSample]:
         """Status texts since the last call, oldest first."""

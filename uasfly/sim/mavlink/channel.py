@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import errno
+import heapq
+import itertools
 import socket
 from collections.abc import Iterator
 
+import numpy as np
 from pymavlink.dialects.v20 import development as dialect
 
 from uasfly.errors import LinkError
+from uasfly.sim.link_faults import LinkFaults
 from uasfly.sim.mavlink.framing import FrameReader, Message
 from uasfly.sim.mavlink.identity import Identity
 
@@ -40,6 +44,7 @@ class UdpChannel:
         remote: host and port that telemetry goes to from the start.
         local_port: port to send from and to listen on, 0 for any that is free.
         identity: ids that the frames carry.
+        faults: what the link does to messages.
 
     Raises:
         LinkError: the remote host is unknown, or the local port is taken.
@@ -49,7 +54,12 @@ class UdpChannel:
         frames: counts of frames received.
     """
 
-    def __init__(self, remote: Address, local_port: int, identity: Identity) -> None:
+    def __init__(self, remote: Address, local_port: int, identity: Identity, faults: LinkFaults | None = None) -> None:
+        self._faults = faults or LinkFaults(np.random.default_rng(0))
+        self._order = itertools.count()
+        self._delayed_out: list[tuple[float, int, bytes, Address]] = []
+        self._delayed_in: list[tuple[float, int, Message, Address]] = []
+        self._now_s = 0.0
         self._identity = identity
         self._home = _Peer(_resolve(remote), identity)
         self._guests: dict[Address, _Peer] = {}
@@ -67,6 +77,9 @@ class UdpChannel:
 
     def receive(self, now_s: float, limit: int) -> Iterator[tuple[Message, Address]]:
         """Yield messages that have arrived, and where from, out of at most `limit` datagrams."""
+        while self._delayed_in and self._delayed_in[0][0] <= now_s:
+            _, _, message, address = heapq.heappop(self._delayed_in)
+            yield message, address
         for _ in range(limit):
             try:
                 datagram, address = self._socket.recvfrom(MAX_DATAGRAM)
@@ -74,7 +87,11 @@ class UdpChannel:
                 return
             for message in self.frames.messages(datagram):
                 self._heard(address, now_s)
-                yield message, address
+                for delay_s in self._faults.command(message.get_type() == "SET_ATTITUDE_TARGET"):
+                    if delay_s > 0.0:
+                        heapq.heappush(self._delayed_in, (now_s + delay_s, next(self._order), message, address))
+                    else:
+                        yield message, address
 
     def send(self, message: Message, address: Address) -> None:
         """Send one message to one address (which must have been heard)."""
@@ -87,6 +104,12 @@ class UdpChannel:
         for peer in self._guests.copy().values():
             if now_s - peer.heard_s > GUEST_TIMEOUT_S:
                 del self._guests[peer.address]
+        self._now_s = now_s
+        while self._delayed_out and self._delayed_out[0][0] <= now_s:
+            _, _, frame, address = heapq.heappop(self._delayed_out)
+            self._put(frame, address)
+        for rubbish in self._faults.garbage(now_s):
+            self._put(rubbish, self._home.address)
         for message in messages:
             self._send(message, self._home)
             for peer in self._guests.values():
@@ -105,8 +128,15 @@ class UdpChannel:
     def _send(self, message: Message, peer: _Peer) -> None:
         frame = message.pack(peer.packer)
         peer.packer.seq = (peer.packer.seq + 1) & 0xFF
+        for delay_s in self._faults.telemetry():
+            if delay_s > 0.0:
+                heapq.heappush(self._delayed_out, (self._now_s + delay_s, next(self._order), frame, peer.address))
+            else:
+                self._put(frame, peer.address)
+
+    def _put(self, data: bytes, address: Address) -> None:
         try:
-            self._socket.sendto(frame, peer.address)
+            self._socket.sendto(data, address)
         except OSError:  # a full buffer or an unreachable network loses telemetry, as a radio does
             return
 

@@ -8,8 +8,11 @@ import os
 import select
 import sys
 import threading
+from queue import SimpleQueue
 
 from uasfly.errors import UasflyError
+from uasfly.sim.fault_lines import FaultLines
+from uasfly.sim.faults import Fault
 from uasfly.sim.mavlink.server import serve
 from uasfly.sim.plant import Plant
 from uasfly.sim.scenario import Scenario
@@ -24,9 +27,9 @@ def main() -> None:
 
     Exits with code 2 where the user is to mend something; standard error says what.
     """
-    job = json.loads(sys.stdin.buffer.readline())
-    stop = threading.Event()
-    threading.Thread(target=_watch_parent, args=(job["parent_pid"], stop), daemon=True).start()
+    job = json.loads(_read_line())
+    stop, injected = threading.Event(), SimpleQueue[Fault]()
+    threading.Thread(target=_watch_parent, args=(job["parent_pid"], stop, injected), daemon=True).start()
     try:
         vehicle = SimulatedVehicle(
             Plant.model_validate_json(job["plant"]),
@@ -38,7 +41,7 @@ def main() -> None:
         gc.collect()
         gc.freeze()  # what lives now lives to the end: collecting it again would only delay telemetry
         remote = (job["remote"][0], job["remote"][1])
-        report = serve(vehicle, remote, job["local_port"], job["system_id"], stop, _say_ready)
+        report = serve(vehicle, remote, job["local_port"], job["system_id"], stop, _say_ready, injected)
     except UasflyError as error:
         print(error, file=sys.stderr, flush=True)
         sys.exit(USER_ERROR)
@@ -49,10 +52,22 @@ def _say_ready(local_port: int) -> None:
     print(f"ready {local_port}", flush=True)
 
 
-def _watch_parent(parent_pid: int, stop: threading.Event) -> None:
-    """Set `stop` when standard input ends; the parent's id is looked at too, since others may hold the pipe open."""
+def _read_line() -> bytes:
+    """The first line of standard input, and not a byte more: faults may follow."""
+    line = b""
+    while not line.endswith(b"\n") and (piece := os.read(0, 1)):
+        line += piece
+    return line
+
+
+def _watch_parent(parent_pid: int, stop: threading.Event, injected: SimpleQueue[Fault]) -> None:
+    """Take faults, and set `stop` when standard input ends; the parent's id counts too: others may hold the pipe."""
+    lines = FaultLines(injected.put, lambda text: print(text, file=sys.stderr, flush=True))
     while os.getppid() == parent_pid:
         readable, _, _ = select.select((0,), (), (), PARENT_CHECK_INTERVAL_S)
-        if readable and not os.read(0, 1024):
-            break
+        if readable:
+            data = os.read(0, 4096)
+            if not data:
+                break
+            lines.feed(data)
     stop.set()

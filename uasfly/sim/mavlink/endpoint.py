@@ -86,7 +86,16 @@ class Endpoint:
         sender = Sender(message.get_srcSystem(), message.get_srcComponent())
         if sender == Sender(self._identity.system, self._identity.component):
             return []
-        return handler(message, sender)
+        answers = handler(message, sender)
+        for answer in answers:
+            if answer.get_type() == "COMMAND_ACK":
+                odd = self.view.vehicle.link_faults.acknowledgement()
+                answer.result = answer.result if odd is None else odd
+        return answers
+
+    def shift(self, step_s: float) -> None:
+        """The vehicle's clock has jumped: what is due stays due."""
+        self._scheduler.shift(step_s)
 
     def poll(self) -> list[Message]:
         """Everything that is due for everybody, now that the vehicle has been advanced."""

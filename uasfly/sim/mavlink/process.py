@@ -1,8 +1,9 @@
 """A simulated vehicle in a process of its own.
 
 Parent and child share three pipes: the parent writes the job (one line of JSON) to the child's standard input and then
-holds it open, so that its end tells the child that the parent is gone, however it went; the child writes "ready PORT"
-to its standard output, and a report when it ends; what it has to complain about goes to a temporary file.
+holds it open, for faults (a line of JSON each) and so that its end tells the child that the parent is gone, however it
+went; the child writes "ready PORT" to its standard output, and a report when it ends; what it has to complain about
+goes to a temporary file.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from types import TracebackType
 from typing import IO, Self
 
 from uasfly.errors import LinkError
+from uasfly.sim.faults import Fault
 from uasfly.sim.mavlink.channel import DEFAULT_REMOTE
 from uasfly.sim.mavlink.server import ServerReport
 from uasfly.sim.plant import Plant
@@ -84,6 +86,13 @@ class SimulatedVehicleProcess:
             with contextlib.suppress(ValueError, TypeError):
                 self.report = ServerReport(**json.loads(lines[-1]))
         return self.report
+
+    def inject(self, fault: Fault) -> None:
+        """Let a fault begin now; nothing happens where the vehicle has ended."""
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError, ValueError):
+            self._process.stdin.write(fault.model_dump_json().encode() + b"\n")
+            self._process.stdin.flush()
 
     def wait_until_ready(self, timeout_s: float) -> None:
         """Wait for the vehicle to answer on its port.

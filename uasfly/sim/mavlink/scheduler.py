@@ -62,6 +62,12 @@ class Scheduler:
         timer = self._timers.get(message_id)
         return None if timer is None else timer.stream
 
+    def shift(self, step_s: float) -> None:
+        """Move everything that is due along with a clock that has jumped."""
+        for timer in self._timers.values():
+            timer.due_s += step_s
+        self._find_running()
+
     def collect(self, view: VehicleView) -> list[Message]:
         """Messages of the streams that are due at the view's time, each counted as sent.
 

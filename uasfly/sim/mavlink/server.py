@@ -11,8 +11,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from queue import SimpleQueue
 from typing import Any
 
+from uasfly.errors import UasflyError
+from uasfly.sim.faults import Fault
 from uasfly.sim.mavlink.channel import DEFAULT_LOCAL_PORT, DEFAULT_REMOTE, Address, UdpChannel
 from uasfly.sim.mavlink.endpoint import Endpoint
 from uasfly.sim.mavlink.identity import Identity
@@ -23,6 +26,7 @@ MAX_ADVANCE_S = 0.04  # simulated at a stretch, before the link is served again
 LONGEST_SLEEP_S = 0.02  # less than MAX_ADVANCE_S, so that a vehicle without streams keeps pace too
 DATAGRAMS_AT_ONCE = 100
 CLOCK_AHEAD_STEPS = 2
+BOOT_S = 1.0  # a vehicle that starts again says nothing for so long
 
 
 @dataclass(slots=True)
@@ -63,6 +67,7 @@ class Server:
         system_id: MAVLink system id; the component is 1.
         clock: seconds, monotonic.
         warn: takes one line when the vehicle first falls behind the clock.
+        injected: faults that are to begin now; they may be put there from any thread.
 
     Raises:
         LinkError: the port is taken or the host unknown.
@@ -76,13 +81,18 @@ class Server:
         system_id: int = 1,
         clock: Callable[[], float] = time.monotonic,
         warn: Callable[[str], None] | None = None,
+        injected: SimpleQueue[Fault] | None = None,
     ) -> None:
-        identity = Identity(system_id)
+        self._identity = identity = Identity(system_id)
+        self._injected = injected or SimpleQueue()
         self._vehicle = vehicle
         self._clock = clock
         self._warn = warn or _print_warning
-        self.channel = UdpChannel(remote, local_port, identity)
+        self.channel = UdpChannel(remote, local_port, identity, vehicle.link_faults)
         self.endpoint = Endpoint(vehicle, identity, self._now_s, time.time)
+        self._boots = vehicle.boots
+        self._vehicle_s = vehicle.time_s  # as it should be; its clock may jump
+        self._silent_until_s = -math.inf
         self.report = ServerReport()
         self._started_s = vehicle.time_s
         self._epoch_s = clock() - vehicle.time_s
@@ -102,11 +112,36 @@ class Server:
 
     def turn(self) -> None:
         """One turn of the loop: bring the vehicle up to now, take what has arrived, send what is due."""
+        self._inject()
         self._advance()
+        self._follow_clock()
         self._receive()
+        if self._clock() < self._silent_until_s:
+            return
         messages = self.endpoint.poll()
         self.report.sent += len(messages)
         self.channel.broadcast(messages, self._clock())
+
+    def _inject(self) -> None:
+        while not self._injected.empty():
+            try:
+                self._vehicle.inject(self._injected.get())
+            except UasflyError as error:
+                self._warn(f"this fault cannot happen here: {error}")
+        self._follow_clock()
+
+    def _follow_clock(self) -> None:
+        """The vehicle's clock may have jumped, or the vehicle may have started again."""
+        jump_s, self._vehicle_s = self._vehicle.time_s - self._vehicle_s, self._vehicle.time_s
+        if abs(jump_s) < 0.5 * self._vehicle.step_s:
+            return
+        self._epoch_s -= jump_s
+        if self._vehicle.boots == self._boots:
+            self.endpoint.shift(jump_s)
+            return
+        self._boots = self._vehicle.boots
+        self._silent_until_s = self._clock() + BOOT_S
+        self.endpoint = Endpoint(self._vehicle, self._identity, self._now_s, time.time)
 
     def _now_s(self) -> float:
         """The vehicle's clock. It runs on between steps, and waits for a vehicle that falls behind."""
@@ -120,7 +155,8 @@ class Server:
             return
         steps = math.floor(min(lag_s, MAX_ADVANCE_S) / vehicle.step_s + 1e-6)
         if steps > 0:
-            vehicle.advance_to(vehicle.time_s + steps * vehicle.step_s)
+            self._vehicle_s = vehicle.time_s + steps * vehicle.step_s
+            vehicle.advance_to(self._vehicle_s)
 
     def _slip(self, lag_s: float) -> None:
         """Let the vehicle's clock stand still for the time that this machine did not manage."""
@@ -136,6 +172,8 @@ class Server:
     def _receive(self) -> None:
         now_s = self._clock()
         for message, address in self.channel.receive(now_s, DATAGRAMS_AT_ONCE):
+            if now_s < self._silent_until_s:
+                continue
             for answer in self.endpoint.receive(message):
                 self.report.sent += 1
                 self.channel.send(answer, address)
@@ -163,6 +201,7 @@ def serve(
     system_id: int = 1,
     stop: threading.Event | None = None,
     ready: Callable[[int], None] | None = None,
+    injected: SimpleQueue[Fault] | None = None,
 ) -> ServerReport:
     """Serve a vehicle in real time until `stop` is set, or SIGINT or SIGTERM arrives.
 
@@ -173,12 +212,13 @@ def serve(
         system_id: see `Server`.
         stop: ends serving when set.
         ready: called with the local port once clients are answered.
+        injected: see `Server`.
 
     Raises:
         LinkError: the port is taken or the host unknown.
     """
     stop = stop or threading.Event()
-    server = Server(vehicle, remote, local_port, system_id)
+    server = Server(vehicle, remote, local_port, system_id, injected=injected)
     with _ended_by_signals(stop):
         if ready is not None:
             ready(server.channel.local_port)

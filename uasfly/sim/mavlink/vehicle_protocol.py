@@ -16,6 +16,8 @@ from uasfly.messages import (
     TruthSample,
     VehicleSample,
 )
+from uasfly.sim.faults import Fault
+from uasfly.sim.link_faults import LinkFaults
 from uasfly.sim.parameters import Parameter
 from uasfly.sim.sensors import GnssSample, InertialSample
 
@@ -27,6 +29,7 @@ class Vehicle(Protocol):
         time_s: vehicle time of the last step.
         step_s: length of a step.
         parameters: PX4 parameters by name: type (int or float) and value.
+        boots: how often it has started. link_faults: what the link does to messages.
     """
 
     @property
@@ -37,6 +40,15 @@ class Vehicle(Protocol):
 
     @property
     def parameters(self) -> MutableMapping[str, Parameter]: ...  # noqa: D102
+
+    @property
+    def boots(self) -> int: ...  # noqa: D102
+
+    @property
+    def link_faults(self) -> LinkFaults: ...  # noqa: D102
+
+    def inject(self, fault: Fault) -> None:
+        """Let a fault begin now."""
 
     def advance_to(self, time_s: float) -> None:
         """Simulate until `time_s`."""
