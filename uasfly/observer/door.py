@@ -26,6 +26,7 @@ class Odometry:
         quaternion: (4,) body to world, unit length; identity where not used.
         rate: (3,) rad/s, body; None where it cannot be used.
         use: attitude, position, velocity (the order of states.SENSORS): 1.0 where used, else 0.0.
+        velocity_factor: on the variance of the velocity.
     """
 
     time_s: float
@@ -34,6 +35,7 @@ class Odometry:
     quaternion: list[float]
     rate: list[float] | None
     use: tuple[float, float, float]
+    velocity_factor: float = 1.0
 
     @property
     def complete(self) -> bool:

@@ -21,7 +21,7 @@ from uasfly.observer import update as up
 # A sensor whose mean innovation exceeds this many configured sigmas has jumped; the state then follows it at about this
 # speed (see `_recovery`), in the order of states.SENSORS: rad/s, m/s, m/s^2.
 JUMP_SIGMAS = 3.0
-RECOVERY_RATES = (1.0, 0.5, 2.0)
+RECOVERY_RATES = (1.0, 50.0, 2.0)  # the position's goes into the GNSS bias, which nothing flies by: it may be fast
 
 
 class Caller:
@@ -90,8 +90,6 @@ def odometry_step(markers: int) -> ca.Function:
         inputs[s.IN_POSITION] - me.measure_position(core),
         inputs[s.IN_VELOCITY] - me.measure_velocity(core),
     )
-    free = inputs[s.IN_BIAS_FREE]
-    allowed = _held_bias(free, layout)
     error = ca.SX.zeros(layout.errors)
     matched, means, nis, accepted, residuals = [], [], [], [], []
     for sensor in range(len(s.SENSORS)):
@@ -99,6 +97,10 @@ def odometry_step(markers: int) -> ca.Function:
         mean = packed[layout.mean][3 * sensor : 3 * sensor + 3]
         state = _Sensor(sensor, up.symmetric(ca.reshape(block, 3, 3)), mean, inputs)
         covariance = covariance + _recovery(state, layout)
+        free = inputs[s.IN_BIAS_FREE]
+        if sensor == s.POSITION_SENSOR:
+            free = ca.fmax(free, state.jumped)
+        allowed = _held_bias(free, layout)
         jacobian = ca.horzcat(me.odometry_jacobian(core, sensor), ca.SX(3, layout.errors - s.CORE_ERROR))
         residual = innovations[sensor] - ca.mtimes(jacobian, error)
         expected = ca.mtimes(ca.mtimes(jacobian, covariance), jacobian.T)
@@ -110,7 +112,8 @@ def odometry_step(markers: int) -> ca.Function:
         error = error + ca.mtimes(gain, residual)
         weight = state.use * inputs[s.IN_MATCHING_WEIGHT]
         matched.append(ca.vec(up.matched_covariance(state.matched, state.noise, inverse, shortened, weight)))
-        means.append(mean + state.use * inputs[s.IN_MEAN_WEIGHT] * (shortened - mean))
+        told = shortened * (1.0 - passed) if sensor == s.POSITION_SENSOR else shortened
+        means.append(mean + state.use * inputs[s.IN_MEAN_WEIGHT] * (told - mean))
         nis.append(value)
         accepted.append(passed)
         residuals.append(residual)
@@ -131,6 +134,7 @@ class _Sensor:
         self.interval = inputs[s.IN_INTERVAL]
         self.correlation = inputs[s.IN_CORRELATION][index]
         self.noise = up.bounded(matched, self.variance)
+        self.jumped = ca.dot(mean, mean) > JUMP_SIGMAS**2 * self.variance
 
 
 def _held_bias(free: ca.SX, layout: s.Layout) -> ca.SX:
@@ -139,7 +143,8 @@ def _held_bias(free: ca.SX, layout: s.Layout) -> ca.SX:
     GNSS alone sees only the sum p + b. What an innovation says of that sum then goes to the position, and the bias
     stays: the position follows GNSS, and the two cannot drift apart. The bias's noise goes on, so that the covariance
     (Joseph) tells how far position and bias, with opposite signs, may have gone. When a marker frees the bias nothing
-    jumps.
+    jumps. A measured position that has jumped against everything else frees it too: that is an error of GNSS, and the
+    vehicle has not moved.
     """
     allowed = ca.SX.eye(layout.errors)
     allowed[s.D_POSITION, s.D_BIAS] = (1.0 - free) * ca.SX.eye(3)
@@ -153,10 +158,10 @@ def _recovery(sensor: _Sensor, layout: s.Layout) -> ca.SX:
     After a jump by e the matched R is about e e'. A state with process noise q then closes the gap at e / tau,
     tau = sqrt(r / q), r = R dt: with q = rate^2 dt that is `rate`, whatever the size of the jump and the sample rate.
     So the estimate glides to the new place instead of stepping there, and a jump that returns soon has hardly moved it.
-    A jump of the position is GNSS's: the noise goes to the bias (and the position follows while that is held).
+    A jump of the position is GNSS's: the noise goes to the bias, which is free meanwhile, so that it takes the jump.
+    There the mean counts only innovations outside the gate: what the filter expected (after silence) is no jump.
     """
-    jumped = ca.dot(sensor.mean, sensor.mean) > JUMP_SIGMAS**2 * sensor.variance
-    variance = sensor.use * jumped * (RECOVERY_RATES[sensor.index] * sensor.interval) ** 2 * sensor.correlation
+    variance = sensor.use * sensor.jumped * (RECOVERY_RATES[sensor.index] * sensor.interval) ** 2 * sensor.correlation
     diagonal = ca.SX(layout.errors, 1)
     diagonal[(s.D_ATTITUDE, s.D_BIAS, s.D_VELOCITY)[sensor.index]] = variance
     return ca.sparsify(ca.diag(diagonal))

@@ -14,6 +14,7 @@ from uasfly.airframe import Airframe
 from uasfly.messages import (
     Array,
     AttitudeTargetSample,
+    HealthSample,
     MarkerSample,
     OdometrySample,
     Sample,
@@ -22,7 +23,9 @@ from uasfly.messages import (
     VehicleSample,
 )
 from uasfly.observer import states as s
+from uasfly.observer.diagnosis import Diagnosis, Journal
 from uasfly.observer.door import Odometry, Sighting, checked_odometry, checked_sighting
+from uasfly.observer.gnss import DriftWatch, Outage
 from uasfly.observer.moment import Moment, Verdict
 from uasfly.observer.step import Stepper, hover_thrust_history
 from uasfly.observer.timeline import Timeline
@@ -76,6 +79,9 @@ class Observer:
             self._stepper.prepare(markers)
         self._k_thrust_m_s2 = airframe.model.k_thrust_m_s2
         self._timeline: Timeline | None = None
+        self._journal = Journal()
+        self._drift = DriftWatch(airframe.observer.gnss_bias_density)
+        self._outage = Outage(airframe.observer.velocity_sigma_m_s)
         self._in_air = False
         self._in_air_s = -math.inf
         self._own_command_s = -math.inf
@@ -89,7 +95,7 @@ class Observer:
             if odometry is None or not odometry.complete:
                 self.counters.non_finite += 1
             if odometry is not None:
-                self._measure(odometry)
+                self._measure(self._outage.usable(odometry) if self._in_air and self._outage.active else odometry)
         elif isinstance(sample, MarkerSample):
             sighting = checked_sighting(sample)
             if sighting is None:
@@ -99,6 +105,8 @@ class Observer:
         elif isinstance(sample, AttitudeTargetSample):
             if abs(sample.time_s - self._own_command_s) > OWN_COMMAND_S:
                 self._command(sample.time_s, sample.thrust)
+        elif isinstance(sample, HealthSample):
+            self._outage.hear(sample)
         elif isinstance(sample, VehicleSample):
             if not math.isfinite(sample.time_s):
                 self.counters.non_finite += 1
@@ -150,6 +158,17 @@ class Observer:
             force_sigma_m_s2=sigmas[s.D_FORCE],
         )
 
+    def diagnose(self, time_s: float, window_s: float = 1.0) -> Diagnosis:
+        """What the filter thinks of its own work at `time_s`; the window [s] must be the same in every call.
+
+        Raises:
+            LookupError: before the first odometry sample.
+        """
+        moment = self.moment
+        if moment is None:
+            raise LookupError("the observer has nothing to diagnose before the first odometry sample")
+        return self._journal.diagnose(time_s, moment, window_s, self._drift.speed_m_s, self.counters.restarts)
+
     @property
     def moment(self) -> Moment | None:
         """The filter where it stands (nominal state, markers, time); None before the first odometry sample."""
@@ -193,10 +212,17 @@ class Observer:
         else:
             self._dropped_from_s = None
             if time_s >= newest_s:
-                self._note(timeline.append(time_s, measured, self._in_air))
+                self._note(time_s, timeline.append(time_s, measured, self._in_air))
+                if isinstance(measured, Odometry):
+                    self._follow_gnss(timeline.newest, measured)
             else:
                 self.counters.late += 1
-                self._note(timeline.insert(measured))
+                self._note(time_s, timeline.insert(measured))
+
+    def _follow_gnss(self, moment: Moment, odometry: Odometry) -> None:
+        self._drift.look(moment, odometry)
+        self._stepper.bias_free = self._drift.runs_away
+        self._journal.follow(moment.time_s, moment)
 
     def _is_confirmed(self, measured: Odometry | Sighting) -> bool:
         """Whether a sample far ahead is believed: one alone is a wrong time stamp, a second soon after confirms it."""
@@ -224,8 +250,9 @@ class Observer:
             self.counters.restarts += 1
             self._start(measured)
 
-    def _note(self, verdicts: tuple[Verdict, ...]) -> None:
+    def _note(self, time_s: float, verdicts: tuple[Verdict, ...]) -> None:
         for verdict in verdicts:
             self.statistics[verdict.sensor] = (verdict.nis, verdict.dof)
+            self._journal.note(time_s, verdict)
             if not verdict.accepted:
                 self.counters.rejected[verdict.sensor] += 1

@@ -27,6 +27,7 @@ GROUND_ACCELERATION_DENSITY = 1.0  # m/s^2/sqrt(Hz): on the ground the model kno
 INITIAL_FORCE_SIGMA = 1.0  # m/s^2, before anything is known of the wind (P0 of Kalaitzakis 2023)
 MARKER_FRESH_S = 1.0  # for this long after an accepted sighting the GNSS bias counts as observable
 MEAN_TIME_S = 0.25  # time constant of the mean innovation that tells a jump from noise
+RUNAWAY_FACTOR = 100.0  # on the variance of the GNSS bias's walk, while GNSS runs away
 _NO_RATE = (0.0, 0.0, 0.0)
 SHORTEST_INTERVAL_S = 1e-3  # between samples
 LONGEST_INTERVAL_S = 0.1  # a sample after a pause weighs no more in the matching than after this
@@ -44,6 +45,7 @@ class Stepper:
         noise = airframe.observer
         self._thrust = thrust
         self._noise = noise
+        self.bias_free = False  # whether GNSS runs away from everything else: its bias takes what it says
         self._window_s = noise.matching_window_s
         self._correlations_s = (
             noise.attitude_correlation_s,
@@ -118,7 +120,7 @@ class Stepper:
             self._thrust.mean(start_s, end_s),
             *(rate if known else _NO_RATE),
             moment.airborne,
-            noise.gnss_bias_density**2,
+            (RUNAWAY_FACTOR if self.bias_free else 1.0) * noise.gnss_bias_density**2,
             noise.force_density**2 if moment.airborne else 0.0,
             noise.acceleration_density**2 if moment.airborne else GROUND_ACCELERATION_DENSITY**2,
             noise.attitude_density**2 if known else UNKNOWN_TURN_DENSITY**2,
@@ -148,13 +150,13 @@ class Stepper:
         self._prepare_prediction(before, last_s, time_s, rate)
         interval_s = max(time_s - before.odometry_s, SHORTEST_INTERVAL_S)
         counted_s = min(interval_s, LONGEST_INTERVAL_S)
-        bias_free = any(time_s - sighted_s < MARKER_FRESH_S for sighted_s in before.sighted_s)
+        bias_free = self.bias_free or any(time_s - sighted_s < MARKER_FRESH_S for sighted_s in before.sighted_s)
         inputs[s.IN_MEASURED] = (
             *odometry.quaternion,
             *odometry.position,
             *odometry.velocity,
             *odometry.use,
-            *[correlation_factor(interval_s, correlation_s) for correlation_s in self._correlations_s],
+            *self._factors(interval_s, odometry.velocity_factor),
         )
         inputs[s.IN_WEIGHTS] = (
             counted_s,
@@ -183,6 +185,11 @@ class Stepper:
             odometry,
         )
         return moment, verdicts
+
+    def _factors(self, interval_s: float, velocity_factor: float) -> tuple[float, ...]:
+        """Factors on the variances of attitude, position and velocity."""
+        attitude, position, velocity = (correlation_factor(interval_s, time_s) for time_s in self._correlations_s)
+        return attitude, position, velocity * velocity_factor
 
     def _sighting(self, moment: Moment, sighting: Sighting) -> tuple[Moment, tuple[Verdict, ...]]:
         """The moment after the sighting; `moment` is already predicted to its time."""
