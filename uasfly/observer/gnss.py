@@ -13,7 +13,7 @@ from dataclasses import replace
 from uasfly.messages import HealthSample
 from uasfly.observer import states as s
 from uasfly.observer.door import Odometry
-from uasfly.observer.moment import Moment
+from uasfly.observer.moment import Verdict
 
 FIX = 3  # GNSS fix type of a three-dimensional position
 INERTIAL_DRIFT_M_S2 = 0.03  # PX4's velocity runs away with about this without GNSS (its own simulator)
@@ -76,26 +76,36 @@ class DriftWatch:
         self._limit_m_s = max(SLOWEST_DRIFT_M_S, DRIFT_SIGMAS * bias_density / math.sqrt(DRIFT_WINDOW_S))
         self._past: deque[tuple[float, Vector]] = deque()
         self._time_s = -math.inf
+        self._agreed_s = -math.inf
+        self._velocity = [0.0, 0.0, 0.0]
         self._way = (0.0, 0.0, 0.0)
         self.speed_m_s = 0.0
 
-    def look(self, moment: Moment, odometry: Odometry) -> None:
-        """The filter after a sample."""
-        vx, vy, vz = moment.packed[s.VELOCITY].tolist()
-        elapsed = moment.time_s - self._time_s
+    def look(self, odometry: Odometry, verdicts: tuple[Verdict, ...]) -> None:
+        """A sample, and what the gates said of it; a velocity that is refused proves nothing."""
+        agrees = all(v.accepted for v in verdicts if v.sensor != s.SENSORS[s.POSITION_SENSOR])
+        elapsed = odometry.time_s - self._time_s
         if not 0.0 <= elapsed < LONGEST_ELAPSED_S:
             self._past.clear()
             elapsed = 0.0
-        self._time_s = moment.time_s
+        self._time_s = odometry.time_s
+        if agrees:
+            self._agreed_s = odometry.time_s
+        elif odometry.time_s - self._agreed_s > LONGEST_ELAPSED_S:
+            self._past.clear()
+            self.speed_m_s = 0.0
+        if agrees and odometry.use[s.VELOCITY_SENSOR]:
+            self._velocity = odometry.velocity
+        vx, vy, vz = self._velocity
         wx, wy, wz = self._way
         self._way = wx, wy, wz = wx + vx * elapsed, wy + vy * elapsed, wz + vz * elapsed
-        if not odometry.use[s.POSITION_SENSOR]:
+        if not (agrees and all(odometry.use)):
             return
         x, y, z = odometry.position
         now = (x - wx, y - wy, z - wz)
         past = self._past
-        past.append((moment.time_s, now))
-        while past[0][0] < moment.time_s - DRIFT_WINDOW_S:
+        past.append((odometry.time_s, now))
+        while past[0][0] < odometry.time_s - DRIFT_WINDOW_S:
             past.popleft()
         self.speed_m_s = math.dist(now, past[0][1]) / DRIFT_WINDOW_S
 

@@ -212,17 +212,15 @@ class Observer:
         else:
             self._dropped_from_s = None
             if time_s >= newest_s:
-                self._note(time_s, timeline.append(time_s, measured, self._in_air))
+                verdicts = timeline.append(time_s, measured, self._in_air)
+                self._note(time_s, verdicts)
                 if isinstance(measured, Odometry):
-                    self._follow_gnss(timeline.newest, measured)
+                    self._drift.look(measured, verdicts)
+                    self._stepper.bias_free = self._drift.runs_away
+                    self._journal.follow(time_s, timeline.newest)
             else:
                 self.counters.late += 1
                 self._note(time_s, timeline.insert(measured))
-
-    def _follow_gnss(self, moment: Moment, odometry: Odometry) -> None:
-        self._drift.look(moment, odometry)
-        self._stepper.bias_free = self._drift.runs_away
-        self._journal.follow(moment.time_s, moment)
 
     def _is_confirmed(self, measured: Odometry | Sighting) -> bool:
         """Whether a sample far ahead is believed: one alone is a wrong time stamp, a second soon after confirms it."""
