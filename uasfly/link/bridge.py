@@ -94,6 +94,10 @@ class Bridge:
                 return heard
             await asyncio.sleep(SEARCH_INTERVAL_S)
 
+    def heard(self) -> list[HeardSystem]:
+        """The systems heard so far, in the order of their ids."""
+        return sorted(map(_describe, self._mavsdk.get_systems()), key=lambda system: system.system_id)
+
     @property
     def attached(self) -> bool:
         """Whether `find` has found its vehicle."""

@@ -16,6 +16,7 @@ AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 COMPANION = 195  # the component id that MAVSDK gives a companion computer
 ATTITUDE_THRUST_AND_YAW_RATE = 3  # type_mask: ignore body roll and pitch rate
 PARAMETER_REAL32 = 9  # MAV_PARAM_TYPE_REAL32
+BY_NAME = -1  # param_index of a request that names its parameter
 TEXT_BYTES = 50  # STATUSTEXT carries this much; more goes in chunks
 
 _ATTITUDE_TARGET = (
@@ -82,6 +83,13 @@ def parameter_set(system_id: int, name: str, value: float) -> str:
         "param_type": PARAMETER_REAL32,
     }
     return json.dumps(fields, allow_nan=False)
+
+
+def parameter_request(system_id: int, name: str) -> str:
+    """PARAM_REQUEST_READ of a parameter by its name."""
+    return json.dumps(
+        {"target_system": system_id, "target_component": AUTOPILOT, "param_id": name, "param_index": BY_NAME}
+    )
 
 
 def time_request(system_id: int, sent_ns: int) -> str:

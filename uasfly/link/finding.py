@@ -62,6 +62,20 @@ async def find_vehicle(
         left_s = SECOND_SEARCH_S
 
 
+def refuse_several(url: ConnectionUrl, heard: list[HeardSystem]) -> None:
+    """Refuse to choose between vehicles.
+
+    Raises:
+        LinkError: when more than one of the systems heard is a vehicle; the text lists them.
+    """
+    vehicles = [str(system) for system in heard if system.autopilot]
+    if len(vehicles) > 1:
+        raise LinkError(
+            f"{url}: expected one vehicle, heard {len(vehicles)}: {', '.join(vehicles)}. "
+            "Say which one is meant with --system-id, or give each a port of its own"
+        )
+
+
 async def _with_numeric_host(url: ConnectionUrl) -> ConnectionUrl:
     """MAVSDK wants a numeric host."""
     if url.scheme == "serial":

@@ -6,31 +6,37 @@ import asyncio
 import contextlib
 import itertools
 import logging
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
+import numpy as np
 from pydantic_core import from_json
 
 from uasfly.errors import LinkError
+from uasfly.frames import swap_enu_ned
 from uasfly.link.bridge import Bridge
 from uasfly.link.clock import ClockMap
 from uasfly.link.commands import CommandChannel
 from uasfly.link.decoder import Decoder
 from uasfly.link.encode import attitude_target, check_setpoint, status_texts
 from uasfly.link.events import EchoFilter, EventFeed
-from uasfly.link.finding import find_vehicle
+from uasfly.link.finding import find_vehicle, refuse_several
+from uasfly.link.modes import CMD_REQUEST_MESSAGE
 from uasfly.link.parameters import ParameterChannel
 from uasfly.link.requests import RequestDesk
 from uasfly.link.slots import Slot, WakeUp
 from uasfly.link.timesync import TimeSync
 from uasfly.link.upkeep import WARNING, Upkeep
 from uasfly.link.urls import ConnectionUrl, parse_url
-from uasfly.messages import LinkEvent, LinkSample, Request, Sample, Setpoint, TextSample
+from uasfly.messages import Array, LinkEvent, LinkSample, Request, Sample, Setpoint, TextSample
 
 SETTLING_S = 1.0  # `connect` waits this long for the first time exchanges and message intervals
 SETTLED_EXCHANGES = 5
 LONGEST_SETPOINT_AGE_S = 0.2
+HOME_POSITION_ID = 242
+HOME_PATIENCE_S = 0.5
 
 EVENTS_MIN_BAUD = 230400  # the texts of PX4's events are some 100 kB to fetch, once
 KEPT = {"STATUSTEXT": 64, "ODOMETRY": 16, "ATTITUDE_TARGET": 16, "DEBUG_FLOAT_ARRAY": 16, "HIL_STATE_QUATERNION": 16}
@@ -61,6 +67,7 @@ class MavsdkLink:
         self._events = EventFeed()
         self._echoes = EchoFilter()
         self._own_samples: list[TextSample | LinkSample] = []
+        self._home: asyncio.Future[Array | None] | None = None
         self._text_ids = itertools.cycle(range(1, 0x10000))
         self._commands = CommandChannel(bridge.send, bridge.system_id)
         self._parameters = ParameterChannel(bridge.send, bridge.system_id)
@@ -71,6 +78,7 @@ class MavsdkLink:
             (Slot("TIMESYNC", 16), self._take_time),
             (Slot("COMMAND_ACK", 16), lambda fields, _: self._commands.acknowledge(fields)),
             (Slot("PARAM_VALUE", 64), lambda fields, _: self._parameters.receive(fields)),
+            (Slot("HOME_POSITION", 4), lambda fields, _: self._take_home(fields)),
         ]
         heartbeats = self._sample_slots["HEARTBEAT"]
         self._upkeep = Upkeep(bridge, url, self._time_sync, self._commands, heartbeats, want_truth, self._say)
@@ -84,28 +92,39 @@ class MavsdkLink:
 
     @classmethod
     async def connect(
-        cls, url: str, *, system_id: int | None = None, timeout_s: float = 10.0, want_truth: bool = False
+        cls,
+        url: str,
+        *,
+        system_id: int | None = None,
+        timeout_s: float = 10.0,
+        want_truth: bool = False,
+        listen_s: float = 0.0,
     ) -> MavsdkLink:
         """Open a connection, find the vehicle, start the time exchange and set the message rates.
 
         Args:
             url: see `urls.ACCEPTED_FORMS`.
-            system_id: the vehicle's MAVLink system id; None takes the first vehicle heard.
+            system_id: the vehicle's MAVLink system id; None takes the only vehicle heard.
             timeout_s: how long to wait for the vehicle.
             want_truth: also ask for the true state, where the vehicle is a simulation.
+            listen_s: without a system_id, how long a second vehicle is listened for (a heartbeat comes every second);
+                most of it passes while the link is set up.
 
         Raises:
-            LinkError: for a URL of no accepted form, a busy port, no vehicle, another system id than the one wanted, an
-                autopilot that is not PX4. The text says what to check.
+            LinkError: for a URL of no accepted form, a busy port, no vehicle, several vehicles and no system id,
+                another system id than the one wanted, an autopilot that is not PX4. The text says what to check.
         """
         bridge, numeric_url, heard = await find_vehicle(parse_url(url), system_id, timeout_s)
         link = None
         try:
             link = cls(bridge, numeric_url, want_truth)
-            vehicles = [str(system) for system in heard if system.autopilot]
-            if system_id is None and len(vehicles) > 1:
-                link._say(WARNING, f"several vehicles on this link: {', '.join(vehicles)}; the first one is used")
+            found_s = time.monotonic()
+            if system_id is None:
+                refuse_several(numeric_url, heard)
             await link._start()
+            if system_id is None:
+                await asyncio.sleep(max(0.0, found_s + listen_s - time.monotonic()))
+                refuse_several(numeric_url, bridge.heard())
         except BaseException:
             await link.close() if link else bridge.close()
             raise
@@ -203,6 +222,23 @@ class MavsdkLink:
         for fields in status_texts(severity, text, next(self._text_ids)):
             self._bridge.send("STATUSTEXT", fields)
 
+    async def read_parameters(self, names: Iterable[str]) -> dict[str, float | None]:
+        """Parameters of the vehicle by name; None for one that it does not have, or does not tell within 1.2 s.
+
+        Raises:
+            LinkError: after `close`.
+        """
+        return await self._parameters.read(names)
+
+    async def home(self) -> Array | None:
+        """Home in PX4's local frame, (3,) m, ENU; None where PX4 has none or does not tell within half a second."""
+        if self._home is None or self._home.done():
+            self._home = asyncio.get_running_loop().create_future()
+        answer = self._home
+        await self._commands.command(CMD_REQUEST_MESSAGE, (float(HOME_POSITION_ID),), repeats=1)
+        await asyncio.wait((answer,), timeout=HOME_PATIENCE_S)
+        return answer.result() if answer.done() else None
+
     async def close(self) -> None:
         """Stop everything and release the connection; idempotent. Requests under way stay unanswered."""
         if self._closed:
@@ -295,6 +331,11 @@ class MavsdkLink:
             self._upkeep.ask_for_streams()
         if self._clock.exchanges >= SETTLED_EXCHANGES:
             self._synchronised.set()
+
+    def _take_home(self, fields: dict[str, Any]) -> None:
+        if self._home is not None and not self._home.done():
+            numbers = [math.nan if fields[axis] is None else float(fields[axis]) for axis in ("x", "y", "z")]
+            self._home.set_result(swap_enu_ned(np.array(numbers)) if all(map(math.isfinite, numbers)) else None)
 
     def _something_waits(self) -> bool:
         return bool(self._own_samples or self._desk.results or self._events or any(self._sample_slots.values()))
