@@ -57,11 +57,14 @@ class EstimateMonitor(Monitor):
 
 
 class GnssLostMonitor(Monitor):
-    """PX4 has no GNSS fix, or calls its position or velocity invalid."""
+    """PX4 has no GNSS fix, or calls its position or velocity invalid.
+
+    PX4 refuses its own landing once it has given up its position (5 s, EKF2_NOAID_TOUT), so the landing comes before.
+    """
 
     action: ActionName = "hold"
     then: ActionName | None = "land"
-    then_after_s: Seconds = 5.0
+    then_after_s: Seconds = 3.0
 
 
 class GnssDegradedMonitor(Monitor):
@@ -86,11 +89,11 @@ class GnssDriftMonitor(Monitor):
     """The position from GNSS wanders off, against the velocity."""
 
     action: ActionName = "hold"
+    after_s: Seconds = 1.5
     clear_s: Seconds = 3.0
     then: ActionName | None = "end"
-    then_after_s: Seconds = 5.0
-    rate_m_s: Annotated[Positive, Field(description="mean over the window")] = 0.4
-    window_s: Positive = 2.0
+    then_after_s: Seconds = 3.0
+    rate_m_s: Annotated[Positive, Field(description="mean over a second")] = 0.6
 
 
 class FenceMonitor(Monitor):
@@ -132,7 +135,7 @@ class WindMonitor(Monitor):
     """The wind takes most of what tilt and thrust can give ("cannot hold", "cannot return")."""
 
     action: ActionName = "land"
-    after_s: Seconds = 1.0
+    after_s: Seconds = 0.5
     warn_share: Annotated[Share, Field(description="of the authority, expected soon: told")] = 0.75
     share: Annotated[Share, Field(description="of the authority, expected soon: the action follows")] = 0.95
 

@@ -30,6 +30,7 @@ from uasfly.messages import (
     VehicleSample,
 )
 from uasfly.mission import Mission
+from uasfly.observer.diagnosis import Diagnosis
 
 PERIOD_S = 0.02
 ZERO = np.zeros(3)
@@ -75,6 +76,10 @@ class FakeObserver:
     def set_k_thrust(self, k_thrust_m_s2: float) -> None:
         """Check what the filter would divide by."""
         assert k_thrust_m_s2 > 0.0
+
+    def diagnose(self, time_s: float, window_s: float) -> Diagnosis:
+        """All is well."""
+        return Diagnosis(np.full(3, 0.01), np.full(3, 0.01), {}, {}, 0.0, -math.inf, 0.0, 0.0, 0)
 
     def estimate(self, time_s: float) -> StateEstimate | None:
         """The truth."""

@@ -11,6 +11,8 @@ from uasfly.flight.sequencer import EndingAction, Engage, Sequencer
 from uasfly.flight.view import VehicleView
 from uasfly.messages import (
     FlightMode,
+    LinkEvent,
+    LinkSample,
     OdometrySample,
     Phase,
     Request,
@@ -141,17 +143,63 @@ def test_the_mission_says_how_it_ends(ending: EndingAction, kind: RequestKind) -
     assert script.sequencer.phase is Phase.DONE
 
 
-def test_the_pilot_switching_away_ends_the_stream_at_once() -> None:
-    """A mode other than offboard after the grace time: aborted, nothing more is sent, nothing is asked."""
+def test_the_pilot_switching_away_has_the_vehicle_at_once() -> None:
+    """A mode other than offboard: announced, nothing is asked, and the stream goes on only as an offer."""
     script = _in_legs()
     script.run(5.0)
     asked = len(script.asked)
     script.mode = FlightMode.POSITION
     script.run(0.1)
-    assert script.sequencer.phase is Phase.ABORTED
-    assert not script.sequencer.streaming
-    assert "pilot" in script.sequencer.reason
+    assert script.sequencer.phase is Phase.ENGAGE
+    assert script.sequencer.taken_over
+    assert not script.sequencer.in_offboard
+    assert any("left offboard for position: the pilot" in text for text in script.texts)
+    script.run(30.0)
+    assert len(script.asked) == asked
+    assert script.sequencer.phase is Phase.ENGAGE
+
+
+@pytest.mark.parametrize("times", [1, 3])
+def test_the_next_switch_to_offboard_takes_the_mission_up(times: int) -> None:
+    """By the pilot, as often as wanted; uasfly itself does not ask for it."""
+    script = _in_legs()
+    script.run(2.0)
+    for _ in range(times):
+        script.mode = FlightMode.POSITION
+        script.run(4.0)
+        script.mode = FlightMode.OFFBOARD
+        script.run(1.0)
+        assert script.sequencer.phase is Phase.LEGS
+        assert script.sequencer.in_offboard
+        assert not script.sequencer.taken_over
+    assert script.asked.count(RequestKind.OFFBOARD) == 1
+    script.legs_done = True
     script.run(3.0)
+    assert script.sequencer.phase is Phase.DONE
+
+
+def test_a_vehicle_that_is_landed_by_whoever_took_it_ends_the_flight() -> None:
+    """With uasfly in command of the take-off there is nobody to wait for."""
+    script = _in_legs()
+    script.mode = FlightMode.LAND
+    script.run(3.0)
+    script.armed = script.in_air = False
+    script.run(0.1)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert "taken over" in script.sequencer.reason
+    assert not script.sequencer.hand_over
+
+
+def test_ctrl_c_leaves_a_vehicle_alone_that_somebody_else_has() -> None:
+    """No hold, no landing: it is the pilot's."""
+    script = _in_legs()
+    script.mode = FlightMode.POSITION
+    script.run(1.0)
+    asked = len(script.asked)
+    script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
+    script.run(1.0)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert not script.sequencer.hand_over
     assert len(script.asked) == asked
 
 
@@ -194,25 +242,88 @@ def test_an_uncertain_estimate_does_not_take_off() -> None:
 
 
 def test_stale_telemetry_stops_the_setpoints_and_fresh_telemetry_brings_them_back() -> None:
-    """Older than half a second: no setpoints, announced; back: setpoints, announced."""
+    """Older than 0.2 s: no setpoints, announced; back: setpoints, announced, and the mission is taken up."""
     script = _in_legs()
     script.silent = True
-    script.run(0.4)
+    script.run(0.18)
     assert script.sequencer.streaming
-    script.run(0.3)
+    script.run(0.1)
     assert not script.sequencer.streaming
     script.silent = False
-    script.run(0.1)
+    script.run(PERIOD_S)
     assert script.sequencer.streaming
-    assert any("telemetry is 0.5" in text for text in script.texts)
-    assert "telemetry is back" in script.texts
+    assert script.sequencer.silence_ended
+    assert script.sequencer.phase is Phase.LEGS
+    assert any("telemetry is 0.2 s old" in text for text in script.texts)
+    assert any("telemetry is back after 0." in text for text in script.texts)
+    script.run(PERIOD_S)
+    assert not script.sequencer.silence_ended
+
+
+def test_px4_in_its_failsafe_after_a_silence_is_no_pilot() -> None:
+    """Two seconds of silence: PX4 holds by itself and comes back when setpoints do; whoever stays away has taken it."""
+    script = _in_legs()
+    script.silent = True
+    script.run(2.0)
+    script.silent, script.mode = False, FlightMode.HOLD
+    script.run(1.0)
+    assert script.sequencer.phase is Phase.LEGS
+    assert script.sequencer.streaming
+    script.mode = FlightMode.OFFBOARD
+    script.run(2.0)
+    assert script.sequencer.phase is Phase.LEGS
+    script.silent = True
+    script.run(2.0)
+    script.silent, script.mode = False, FlightMode.HOLD
+    script.run(3.0)
+    assert script.sequencer.taken_over
+
+
+def test_a_long_silence_ends_the_mission() -> None:
+    """After ten seconds nobody knows what the vehicle has done: hold, then the ending."""
+    script = _in_legs()
+    script.silent = True
+    script.run(10.0)
+    assert script.sequencer.phase is Phase.LEGS
+    assert not script.sequencer.streaming
+    script.silent, script.mode = False, FlightMode.HOLD
+    script.run(5.0)
+    assert script.asked[-2:] == [RequestKind.HOLD, RequestKind.LAND]
+    assert script.sequencer.phase is Phase.ABORTED
+    assert script.sequencer.reason == "nothing was heard for 10 s"
+    assert any("link lost" in text for text in script.texts)
+    assert "link is back" in script.texts
+
+
+@pytest.mark.parametrize("stood_s", [0.3, 3.0])
+def test_a_cycle_that_stood_still_is_a_silence_too(stood_s: float) -> None:
+    """The process was stopped: it is said, and the mission is taken up from where the vehicle is by then."""
+    script = _in_legs()
+    script.time_s += stood_s
+    script.run(PERIOD_S)
+    assert script.sequencer.silence_ended
+    assert script.sequencer.streaming
+    assert any(f"stood still for {stood_s:.1f} s" in text for text in script.texts)
+
+
+def test_a_vehicle_that_restarts_in_flight_ends_it() -> None:
+    """Motors off: nothing more is sent, nothing is asked, and nobody is handed anything."""
+    script = _in_legs()
+    script.view.update((LinkSample(script.time_s, LinkEvent.REBOOTED),))
+    script.sequencer.step(script.time_s + PERIOD_S, script.view, _estimate(script.time_s), False)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert script.sequencer.reason == "the vehicle has restarted in flight"
+    assert not script.sequencer.streaming
+    assert not script.sequencer.hand_over
 
 
 def test_lost_telemetry_aborts() -> None:
-    """Five seconds of silence end the flight; PX4's own failsafe has the vehicle by then."""
+    """A minute of silence ends the flight; PX4's own failsafe has had the vehicle all the while."""
     script = _in_legs()
     script.silent = True
-    script.run(6.0)
+    script.run(59.0)
+    assert script.sequencer.phase is Phase.LEGS
+    script.run(3.0)
     assert script.sequencer.phase is Phase.ABORTED
     assert not script.sequencer.streaming
 
@@ -278,12 +389,12 @@ def test_the_pilot_leaving_offboard_is_noticed_at_once_when_offboard_has_been_se
     script = _in_legs()
     script.mode = FlightMode.POSITION
     script.run(PERIOD_S)
-    assert script.sequencer.phase is Phase.ABORTED
-    assert "left offboard for position" in script.sequencer.reason
+    assert script.sequencer.taken_over
+    assert any("left offboard for position" in text for text in script.texts)
 
 
 def test_an_old_heartbeat_after_the_mode_change_is_no_take_over() -> None:
-    """Offboard accepted, but the last heartbeat still tells hold: the legs fly on, and end when hold stays."""
+    """Offboard accepted, but the last heartbeat still tells hold: the legs fly on, and wait when hold stays."""
     script = _script()
     script.run(5.0)
     while script.sequencer.phase is not Phase.LEGS:
@@ -293,8 +404,8 @@ def test_an_old_heartbeat_after_the_mode_change_is_no_take_over() -> None:
     script.run(1.0)
     assert script.sequencer.phase is Phase.LEGS
     script.run(1.0)
-    assert script.sequencer.phase is Phase.ABORTED
-    assert "left offboard for hold" in script.sequencer.reason
+    assert script.sequencer.taken_over
+    assert any("left offboard for hold" in text for text in script.texts)
 
 
 def test_a_mode_change_while_engaging_is_the_pilots() -> None:
@@ -437,11 +548,13 @@ def test_leaving_hands_over_what_uasfly_flies(seconds: float, hand_over: bool) -
 
 
 def test_odometry_from_the_future_is_stale() -> None:
-    """A wrong clock stops the setpoints as silence does, and one wrong stamp does not hide the silence after it."""
+    """A wrong clock stops the setpoints as silence does, and one wrong stamp costs no more than its own time."""
     script = _in_legs()
     script.silent = True
     script.view.update((OdometrySample(script.time_s + 1000.0, ZERO, ZERO, LEVEL, ZERO),))
     script.run(0.1)
     assert not script.sequencer.streaming
-    script.run(6.0)
-    assert script.sequencer.phase is Phase.ABORTED
+    script.silent = False
+    script.run(0.1)
+    assert script.sequencer.streaming
+    assert script.sequencer.phase is Phase.LEGS

@@ -11,24 +11,32 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from uasfly.airframe import Airframe
+from uasfly.control.authority import AuthorityMeter
 from uasfly.control.controller import Controller, ControlResult
-from uasfly.flight.monitors import Monitors
+from uasfly.flight.course import Course
+from uasfly.flight.monitors import Monitors, Watched
+from uasfly.flight.response import Response
 from uasfly.flight.sequencer import EndingAction, Engage, Sequencer
 from uasfly.flight.view import VehicleView
-from uasfly.frames import euler_from_quaternion, wrap_angle
-from uasfly.messages import Array, Phase, ReferenceHorizon, Request, Sample, Setpoint, StateEstimate, Status
+from uasfly.frames import euler_from_quaternion
+from uasfly.messages import (
+    Action,
+    Alarm,
+    Array,
+    Authority,
+    Phase,
+    ReferenceHorizon,
+    Request,
+    Sample,
+    Setpoint,
+    StateEstimate,
+    Status,
+)
 from uasfly.mission import Mission
 from uasfly.observer.observer import Observer
-from uasfly.trajectories.glide import Glide
-from uasfly.trajectories.hold import HoldTrajectory
-from uasfly.trajectories.mission_trajectory import MissionTrajectory
-from uasfly.trajectories.trajectory import TrajectoryError
 
-HOLD_RADIUS_M = 0.2  # while the vehicle engages, the point to hold at follows it beyond this distance
-HOLD_YAW_RAD = math.radians(10.0)  # and beyond this turn
-GLIDE_S = 2.0  # in this time the reference goes from where the vehicle is to that point
-PLAN_AFTER_S = 0.2  # held for so long, the mission is planned from there
 TARGET_FRESH_S = 0.5  # an older attitude target is not what the vehicle is being told
+_ENDINGS = {Action.END: None, Action.RETURN: EndingAction.RETURN, Action.LAND: EndingAction.LAND}
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,19 +60,20 @@ class Pilot:
         self.observer = observer
         self.controller = controller
         self.view = VehicleView()
-        self.sequencer = Sequencer(engage, mission.takeoff.height_m, EndingAction(mission.ending.action))
-        self.monitors = Monitors(mission.limits)
+        self.sequencer = Sequencer(
+            engage, mission.takeoff.height_m, EndingAction(mission.ending.action), mission.monitors.telemetry
+        )
+        self.monitors = Monitors(mission, airframe)
+        self.course = Course(mission, airframe.limits)
+        self._meter = AuthorityMeter(airframe.limits, airframe.model, mission.transition.speed_m_s)
+        self._response = Response()
         self._phase = self.sequencer.phase  # as far as this object has followed it
         self._ground: Array | None = None  # where the vehicle last stood
-        self._origin: Array | None = None
-        self._planned: MissionTrajectory | None = None  # starts where the vehicle holds while it engages
-        self._trajectory: MissionTrajectory | None = None  # the planned one, while the legs fly
-        self._legs_start_s = 0.0
+        self._met: Array | None = None  # where it was first known
         self._leg_started = False
-        self._hold: HoldTrajectory | None = None
-        self._hold_since_s = 0.0
-        self._glide: Glide | None = None  # from where the vehicle is when the legs begin onto the planned start
         self._streamed = False
+        self._control: ControlResult | None = None
+        self._time_s: float | None = None
 
     @property
     def done(self) -> bool:
@@ -85,125 +94,138 @@ class Pilot:
 
     def reference_at(self, times_s: Array) -> ReferenceHorizon:
         """Reference at absolute times (n,) [s, host], in the world frame."""
-        if self._trajectory is not None:
-            reference = self._trajectory.sample(times_s - self._legs_start_s)
-            absolute = replace(reference, time_s=times_s)
-            return absolute if self._glide is None else self._glide.onto(absolute)
-        assert self._hold is not None
-        return self._hold.sample(times_s)
-
-    def leg_at(self, time_s: float) -> int:
-        """Index of the leg that the reference flies at an absolute time, -1 in transitions and outside."""
-        if self._trajectory is None or self.sequencer.phase is not Phase.LEGS:
-            return -1
-        elapsed = time_s - self._legs_start_s
-        return self._trajectory.leg_at(elapsed) if self._trajectory.in_leg(elapsed) else -1
+        return self.course.at(times_s)
 
     def step(self, time_s: float, samples: tuple[Sample, ...]) -> StepResult:
         """One control cycle.
 
         Args:
-            time_s: now, host time [s].
+            time_s: now, host time.
             samples: what has arrived since the last cycle.
         """
         self.view.update(samples)
         for sample in samples:
             self.observer.add(sample)
-        self.observer.set_k_thrust(self.controller.k_thrust_m_s2(self.view.voltage_v))
+        k_thrust = self.controller.k_thrust_m_s2(self.view.voltage_v)
+        self.observer.set_k_thrust(k_thrust)
         estimate = self.observer.estimate(time_s)
-
-        if estimate is not None and not (self.view.armed or self.view.in_air):
-            self._ground = estimate.position_in_world
+        if estimate is not None:
+            self._note_places(estimate)
 
         sequencer = self.sequencer
-        legs_done = self._trajectory is not None and time_s - self._legs_start_s >= self._trajectory.duration_s
-        requests = sequencer.step(time_s, self.view, estimate, legs_done)
-        setpoint, control = None, None
+        requests = sequencer.step(time_s, self.view, estimate, self.course.done(time_s))
+        setpoint, control, authority = None, None, None
+        alarms: tuple[Alarm, ...] = ()
         if estimate is not None:
-            self._follow_phase(time_s, estimate, legs_done)
-            if sequencer.phase is Phase.LEGS and self._origin is not None:
-                breach = self.monitors.check(time_s, estimate, self._origin)
-                if breach:
-                    sequencer.end(time_s, breach)
-                    self._follow_phase(time_s, estimate, legs_done)
+            self._follow_phase(time_s, estimate)
+            authority = self._authority(time_s, estimate, k_thrust)
+            alarms = self._watch(time_s, estimate, authority)
+            self._respond(time_s, estimate, alarms)
         if sequencer.streaming and estimate is not None:
             setpoint = None if sequencer.in_offboard else self._echo(time_s)
             if setpoint is None:
                 if not self._streamed:
-                    self._reset_controller(time_s)
+                    self.controller.reset(time_s, self._told(time_s))
                 control = self.controller.step(time_s, estimate, self.reference_at, self.view.voltage_v)
                 setpoint = control.setpoint
                 if control.text:
                     sequencer.announcements.append((4, control.text))
             self.observer.sent(setpoint, in_offboard=sequencer.in_offboard)
         self._streamed = setpoint is not None
-        return StepResult(setpoint, requests, self._status(time_s, estimate, control), control)
+        self._control, self._time_s = control, time_s
+        return StepResult(setpoint, requests, self._status(time_s, estimate, authority, alarms), control)
 
-    def _follow_phase(self, time_s: float, estimate: StateEstimate, legs_done: bool) -> None:
-        """Reference and origin for the phase that the flight is in now."""
-        before, self._phase = self._phase, self.sequencer.phase
+    def _note_places(self, estimate: StateEstimate) -> None:
+        if self._met is None:
+            self._met = estimate.position_in_world
+        if not (self.view.armed or self.view.in_air):
+            self._ground = estimate.position_in_world
+
+    def _follow_phase(self, time_s: float, estimate: StateEstimate) -> None:
+        """Origin and reference for the phase that the flight is in now."""
+        sequencer, course = self.sequencer, self.course
+        before, self._phase = self._phase, sequencer.phase
         changed = before is not self._phase
-        if changed and self._phase is Phase.TAKEOFF:
-            self._origin = self._origin_of(estimate)
-        elif self._phase is Phase.ENGAGE:
-            if changed:
-                self._hold = self._planned = None
-                self._origin = self._origin if before is Phase.TAKEOFF else self._origin_of(estimate)
-            self._hold_and_plan(time_s, estimate)
-        elif changed and self._phase is Phase.LEGS:
-            self._start_legs(time_s, estimate)
-        elif changed and self._phase is Phase.ENDING and not legs_done:
-            self._trajectory = None
-            self._hold_here(time_s, estimate)  # what has been announced; the reference would fly on
+        match self._phase:
+            case Phase.PREFLIGHT if changed:
+                course.drop()
+            case Phase.TAKEOFF if changed:
+                course.origin = self._origin_of(estimate)
+            case Phase.ENGAGE:
+                if before is Phase.LEGS:
+                    course.freeze(time_s)
+                elif changed and before is not Phase.TAKEOFF:
+                    course.origin = self._origin_of(estimate)
+                course.engage(time_s, estimate)
+            case Phase.LEGS:
+                self._follow_legs(time_s, estimate, changed)
+            case Phase.ENDING if changed and not course.done(time_s):
+                course.stay(time_s, estimate)  # what has been announced; the reference would fly on
+        if course.problem and self._phase in (Phase.ENGAGE, Phase.LEGS):
+            sequencer.end(time_s, course.problem)
 
-    def _hold_and_plan(self, time_s: float, estimate: StateEstimate) -> None:
-        """Keep the point to hold at where the vehicle is; the mission begins there, wherever the pilot has flown to."""
-        if self._hold is None or self._strayed(self._hold, estimate):
-            self._hold_here(time_s, estimate)
-            self._planned = None
-        if self._planned is None and time_s - self._hold_since_s >= PLAN_AFTER_S:
-            self._plan(time_s)  # some tens of milliseconds of work, done while PX4 still flies the vehicle by itself
+    def _follow_legs(self, time_s: float, estimate: StateEstimate, changed: bool) -> None:
+        """Begin, freeze or take up; the controller then starts from what the vehicle is told."""
+        course, sequencer = self.course, self.sequencer
+        if changed and not course.begun:
+            course.start(time_s, estimate)
+        elif changed or sequencer.silence_ended:
+            course.freeze(time_s if self._time_s is None else self._time_s)
+            course.take_up(time_s, estimate)
+        elif not sequencer.streaming:
+            course.freeze(time_s)
+        if changed or sequencer.silence_ended:
+            self._streamed = False
 
-    def _strayed(self, hold: HoldTrajectory, estimate: StateEstimate) -> bool:
-        way = estimate.position_in_world - hold.position_in_world
-        _, _, yaw = euler_from_quaternion(estimate.quaternion_body_to_world)
-        return float(way @ way) > HOLD_RADIUS_M**2 or abs(wrap_angle(yaw - hold.yaw_rad)) > HOLD_YAW_RAD
-
-    def _hold_here(self, time_s: float, estimate: StateEstimate) -> None:
-        _, _, yaw = euler_from_quaternion(estimate.quaternion_body_to_world)
-        self._hold, self._hold_since_s = HoldTrajectory(estimate.position_in_world, yaw), time_s
-
-    def _plan(self, time_s: float) -> None:
-        assert self._hold is not None
-        assert self._origin is not None
-        try:
-            self._planned = MissionTrajectory(
-                self.mission,
-                self.airframe.limits,
-                start_position=self._hold.position_in_world,
-                start_yaw=self._hold.yaw_rad,
-                takeoff_in_world=self._origin,
+    def _watch(self, time_s: float, estimate: StateEstimate, authority: Authority) -> tuple[Alarm, ...]:
+        """Ask the monitors; they look while uasfly flies, and at some things always."""
+        origin = self.course.origin
+        flying = self._phase is Phase.LEGS and self.sequencer.streaming and origin is not None
+        place = np.zeros(3) if origin is None else origin
+        reference = self.reference_at(np.array([time_s])).position_in_world[0] if flying else None
+        return self.monitors.check(
+            Watched(
+                time_s=time_s,
+                flying=flying,
+                estimate=estimate,
+                diagnosis=self.observer.diagnose(time_s, self.mission.monitors.estimate.window_s),
+                view=self.view,
+                origin=place,
+                home=self._home(place),
+                reference=reference,
+                control=self._control,
+                authority=authority,
             )
-        except TrajectoryError as error:
-            self.sequencer.end(time_s, f"the mission cannot be flown from here: {error}")
+        )
 
-    def _start_legs(self, time_s: float, estimate: StateEstimate) -> None:
-        """From now on the reference moves; until now PX4 flew, so the controller starts anew from what it was told."""
-        if self._hold is None or self._strayed(self._hold, estimate):
-            self._hold_here(time_s, estimate)
-            self._planned = None
-        if self._planned is None:
-            self._plan(time_s)
-        self._trajectory, self._legs_start_s = self._planned, time_s
-        assert self._hold is not None
-        _, _, yaw = euler_from_quaternion(estimate.quaternion_body_to_world)
-        offset = estimate.position_in_world - self._hold.position_in_world
-        self._glide = Glide(offset, wrap_angle(yaw - self._hold.yaw_rad), time_s, GLIDE_S)
-        self._reset_controller(time_s)
+    def _respond(self, time_s: float, estimate: StateEstimate, alarms: tuple[Alarm, ...]) -> None:
+        """Do what the worst alarm asks for, where uasfly flies."""
+        sequencer, response, settings = self.sequencer, self._response, self.mission.monitors
+        acting = self._phase is Phase.LEGS and sequencer.streaming
+        sequencer.announcements += response.update(time_s, alarms, acting)
+        if not acting:
+            return
+        if response.action in _ENDINGS:
+            sequencer.end(time_s, response.text, _ENDINGS[response.action])
+        elif response.action is Action.HAND_OVER:
+            sequencer.leave(time_s, response.text)
+        elif response.since_s is not None and time_s - response.since_s > settings.longest_hold_s:
+            sequencer.end(time_s, f"held for {settings.longest_hold_s:.0f} s: {response.text}")
+        else:
+            self.course.act(time_s, response.action, settings.slow_pace, settings.back_off_m)
+            return
+        self._follow_phase(time_s, estimate)
 
-    def _reset_controller(self, time_s: float) -> None:
-        """Let the controller start from what the vehicle was last being told."""
-        self.controller.reset(time_s, self._told(time_s))
+    def _authority(self, time_s: float, estimate: StateEstimate, k_thrust_m_s2: float) -> Authority:
+        home = self._home(estimate.position_in_world)
+        return self._meter.update(time_s, estimate.force_in_world, k_thrust_m_s2, home - estimate.position_in_world)
+
+    def _home(self, otherwise: Array) -> Array:
+        """Where the vehicle stood before it took off, or was first met."""
+        for place in (self._ground, self._met):
+            if place is not None:
+                return place
+        return otherwise
 
     def _told(self, time_s: float) -> Setpoint | None:
         """What PX4's attitude controller is being asked for, None where that is not known freshly."""
@@ -239,28 +261,41 @@ class Pilot:
         x, y, _ = estimate.position_in_world.tolist()
         return np.array((x, y, 0.0))  # met in the air: PX4's local origin lies on the ground where it booted
 
-    def _status(self, time_s: float, estimate: StateEstimate | None, control: ControlResult | None) -> Status:
-        sequencer = self.sequencer
-        leg = self.leg_at(time_s)
+    def _status(
+        self, time_s: float, estimate: StateEstimate | None, authority: Authority | None, alarms: tuple[Alarm, ...]
+    ) -> Status:
+        sequencer, course, view = self.sequencer, self.course, self.view
+        in_legs = sequencer.phase is Phase.LEGS
+        leg = course.leg(time_s) if in_legs else -1
         self._leg_started |= leg >= 0
         reference, progress = None, 0.0
-        if sequencer.phase is Phase.LEGS and self._trajectory is not None:
-            elapsed = time_s - self._legs_start_s
-            progress = min(1.0, max(0.0, elapsed / self._trajectory.duration_s))
+        if course.begun and sequencer.phase in (Phase.LEGS, Phase.ENGAGE):
+            progress = course.progress(time_s)
+        if in_legs and course.begun:
             reference = self.reference_at(np.array([time_s])).position_in_world[0]
         elif sequencer.phase in (Phase.ENDING, Phase.DONE):
             progress = 1.0
         announcements = tuple(sequencer.announcements)
         sequencer.announcements.clear()
+        battery = view.battery
         return Status(
             time_s=time_s,
             phase=sequencer.phase,
             leg=leg,
-            leg_started=self._leg_started and sequencer.phase is Phase.LEGS,
+            leg_started=self._leg_started and in_legs,
             progress=progress,
             estimate=estimate,
             reference_position_in_world=reference,
-            fallback=control.fallback if control is not None else "",
+            fallback=self._control.fallback if self._control is not None else "",
             reason=sequencer.reason,
             announcements=announcements,
+            mode=view.mode,
+            armed=view.armed,
+            battery_remaining=math.nan if battery is None else battery.remaining,
+            battery_voltage_v=view.voltage_v or math.nan,
+            telemetry_age_s=view.odometry_age_s(time_s),
+            authority=authority,
+            alarms=alarms,
+            action=self._response.action,
+            pace=course.pace(time_s) if in_legs else 0.0,
         )

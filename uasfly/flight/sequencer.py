@@ -1,7 +1,7 @@
 """The phases of a flight: connect, preflight, take-off, engage, legs, ending (sans-I/O, no clock of its own).
 
-The pilot's switch always wins: when the vehicle changes its mode without having been asked to, or is being flown by the
-pilot, nothing more is sent and nothing is asked.
+The pilot's switch always wins: when the vehicle changes its mode without having been asked to, nothing more is asked
+and nothing that is sent acts. In the legs the mission then waits: the pilot's next switch to offboard takes it up.
 """
 
 from __future__ import annotations
@@ -9,8 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
+from uasfly.flight.asking import Asking
+from uasfly.flight.readiness import unready
+from uasfly.flight.silence import Silence
 from uasfly.flight.view import VehicleView
 from uasfly.messages import FlightMode, Phase, Request, RequestKind, RequestResult, StateEstimate
+from uasfly.monitor_settings import TelemetryMonitor
 
 PREFLIGHT_TIMEOUT_S = 30.0
 TAKEOFF_TIMEOUT_S = 60.0
@@ -19,14 +23,10 @@ SETTLE_S = 4.0  # in hold after take-off: the wind force is learned here
 STREAM_BEFORE_OFFBOARD_S = 0.6  # PX4 wants a stream before it enters offboard
 ENGAGE_TIMEOUT_S = 10.0
 RETRY_S = 1.0
-ANSWER_TIMEOUT_S = 5.0
 LANDING_TIMEOUT_S = 240.0
-STALE_S = 0.5  # older odometry than this stops the setpoints; PX4's own failsafe acts after COM_OF_LOSS_T
-LOST_S = 5.0
-VELOCITY_SIGMA_READY_M_S = 0.2
-POSITION_SIGMA_READY_M = 5.0  # GNSS drifts unseen while the vehicle waits on the ground, so this one cannot be tight
 HEARTBEAT_GRACE_S = 1.5  # a heartbeat that tells the old mode may still be on its way after an accepted change
 DISCONNECT_S = 15.0
+REFUSALS = 2  # of the ending, before the stream is left to PX4's failsafe
 
 
 class Engage(Enum):
@@ -65,33 +65,40 @@ class Sequencer:
         engage: who brings the vehicle into offboard.
         takeoff_height_m: height above ground of the take-off.
         ending: what follows the legs.
+        telemetry: what counts as silence.
         phase, reason: where the flight is, and why it ended early.
         streaming: whether setpoints are to be sent in this step.
         hand_over: uasfly leaves a vehicle that it was flying: the driver's last request must be hold.
+        taken_over: somebody else has taken the vehicle out of the legs; the mission waits.
+        silence: of the telemetry, and of this cycle itself.
+        silence_ended: a silence after which the mission goes on has ended in this step.
         announcements: new texts with their MAVLink severity, cleared by the reader.
     """
 
     engage: Engage
     takeoff_height_m: float
     ending: EndingAction
+    telemetry: TelemetryMonitor = field(default_factory=TelemetryMonitor)
     phase: Phase = Phase.CONNECT
     reason: str = ""
     streaming: bool = False
     hand_over: bool = False
     announcements: list[tuple[int, str]] = field(default_factory=list)
+    taken_over: bool = False
+    silence_ended: bool = False
+    silence: Silence = field(init=False)
     _entered_s: float = 0.0
-    _asked: Request | None = None
-    _asked_s: float = 0.0
-    _accepted: set[RequestKind] = field(default_factory=set)
+    _asking: Asking = field(default_factory=Asking)
     _offboard_since_s: float | None = None
     _ready_since_s: float | None = None
     _unready_since_s: float | None = None
     _mode: FlightMode = FlightMode.OTHER  # at the last step, or when the phase began
     _mode_seen: bool = False  # the mode that this phase asks for has been reported
-    _hold_refused: bool = False
-    _stale: bool = False
     _interrupts: int = 0
     _abort_reason: str = ""
+
+    def __post_init__(self) -> None:
+        self.silence = Silence(self.telemetry)
 
     def step(
         self, time_s: float, view: VehicleView, estimate: StateEstimate | None, legs_done: bool
@@ -108,10 +115,8 @@ class Sequencer:
             Requests to the vehicle, most often none.
         """
         requests: list[Request] = []
-        for result in view.results:
+        for result in self._asking.answers(time_s, view.results):
             self._answered(time_s, result)
-        if self._asked is not None and time_s - self._asked_s > ANSWER_TIMEOUT_S:
-            self._answered(time_s, RequestResult(time_s, self._asked, accepted=False, text="no answer"))
         self._watch_telemetry(time_s, view)
         match self.phase:
             case Phase.CONNECT:
@@ -146,14 +151,15 @@ class Sequencer:
         else:
             self.end(time_s, reason)
 
-    def end(self, time_s: float, reason: str) -> None:
-        """Leave the mission early: hold, then its ending; the outcome is "aborted" with this reason."""
+    def end(self, time_s: float, reason: str, ending: EndingAction | None = None) -> None:
+        """Leave the mission early: hold, then its ending (or this one); the outcome is "aborted" with this reason."""
         if self.phase in (Phase.ENDING, Phase.DONE, Phase.ABORTED):
             return
         if not self._flies:
             self._abort(time_s, reason)
             return
         self._abort_reason = self._abort_reason or reason
+        self.ending = ending or self.ending
         self.announcements.append((4, f"{reason}: holding, then {self.ending.value}"))
         self._enter(time_s, Phase.ENDING)
 
@@ -161,7 +167,7 @@ class Sequencer:
         """Stop at once: no more setpoints; `hand_over` where the vehicle would be left without anybody."""
         if self.phase in (Phase.DONE, Phase.ABORTED):
             return
-        ends_by_itself = self.phase is Phase.ENDING and _ENDING_REQUESTS[self.ending] in self._accepted
+        ends_by_itself = self.phase is Phase.ENDING and _ENDING_REQUESTS[self.ending] in self._asking.accepted
         self.hand_over = self._flies and not ends_by_itself
         self._abort(time_s, reason)
 
@@ -174,7 +180,7 @@ class Sequencer:
     def _flies(self) -> bool:
         """Whether uasfly is in command, rather than nobody yet or the pilot."""
         if self.phase is Phase.ENGAGE:
-            return self.engage is Engage.AUTO
+            return self.engage is Engage.AUTO and not self.taken_over
         return self.phase in (Phase.TAKEOFF, Phase.LEGS, Phase.ENDING)
 
     # ------------------------------------------------------------------ phases
@@ -191,18 +197,13 @@ class Sequencer:
     def _preflight(
         self, time_s: float, view: VehicleView, estimate: StateEstimate | None, requests: list[Request]
     ) -> None:
-        ready = (
-            estimate is not None
-            and float(estimate.velocity_sigma_m_s.max()) < VELOCITY_SIGMA_READY_M_S
-            and float(estimate.position_sigma_m.max()) < POSITION_SIGMA_READY_M
-            and (view.health is None or (view.health.attitude_ok and view.health.velocity_ok))
-        )
-        if not ready:
+        missing = unready(view, estimate)
+        if missing:
             self._ready_since_s = None
             if self._unready_since_s is None:
                 self._unready_since_s = time_s
             if time_s - self._unready_since_s > PREFLIGHT_TIMEOUT_S:
-                self._abort(time_s, f"not ready to fly after {PREFLIGHT_TIMEOUT_S:.0f} s: {_unready(view, estimate)}")
+                self._abort(time_s, f"not ready to fly after {PREFLIGHT_TIMEOUT_S:.0f} s: {missing}")
             return
         if self._ready_since_s is None:
             self._ready_since_s = time_s
@@ -213,15 +214,16 @@ class Sequencer:
             self._enter(time_s, Phase.ENGAGE)
         elif self.engage is Engage.AUTO:
             self._enter(time_s, Phase.TAKEOFF)
-            self._ask(time_s, Request(RequestKind.ARM), requests)
+            self._asking.ask(time_s, Request(RequestKind.ARM), requests)
 
     def _takeoff(self, time_s: float, view: VehicleView, requests: list[Request]) -> None:
-        if RequestKind.ARM in self._accepted and RequestKind.TAKEOFF not in self._accepted and self._asked is None:
-            self._ask(time_s, Request(RequestKind.TAKEOFF, self.takeoff_height_m), requests)
+        accepted = self._asking.accepted
+        if RequestKind.ARM in accepted and RequestKind.TAKEOFF not in accepted and self._asking.may_ask(time_s, -1.0):
+            self._asking.ask(time_s, Request(RequestKind.TAKEOFF, self.takeoff_height_m), requests)
         self._mode_seen |= view.mode is FlightMode.TAKEOFF
         if self._mode_seen and view.mode not in (FlightMode.TAKEOFF, FlightMode.HOLD):
             self._taken(time_s, "take-off", view)
-        elif RequestKind.TAKEOFF in self._accepted and view.in_air and view.mode is FlightMode.HOLD:
+        elif RequestKind.TAKEOFF in accepted and view.in_air and view.mode is FlightMode.HOLD:
             if self._ready_since_s is None:
                 self._ready_since_s = time_s
             if time_s - self._ready_since_s >= SETTLE_S:
@@ -230,16 +232,18 @@ class Sequencer:
             self.end(time_s, f"take-off not finished within {TAKEOFF_TIMEOUT_S:.0f} s")
 
     def _engage(self, time_s: float, view: VehicleView, requests: list[Request]) -> None:
-        self.streaming = not self._stale
-        if self.engage is Engage.PILOT and not (view.armed and view.in_air):
-            self.streaming = False
-            self._enter(time_s, Phase.PREFLIGHT)  # the pilot has landed again
+        self.streaming = not self.silence.stale
+        if not (view.armed and view.in_air) and (self.taken_over or self.engage is Engage.PILOT):
+            self._landed(time_s)
             return
-        if view.mode is FlightMode.OFFBOARD or RequestKind.OFFBOARD in self._accepted:
+        if view.mode is FlightMode.OFFBOARD or RequestKind.OFFBOARD in self._asking.accepted:
             self._offboard_since_s = time_s
+            if self.taken_over:
+                self.announcements.append((5, "offboard again: the mission is taken up"))
+                self.taken_over = False
             self._enter(time_s, Phase.LEGS)
             return
-        if self.engage is Engage.PILOT:
+        if self.engage is Engage.PILOT or self.taken_over:
             return
         waited = time_s - self._entered_s
         if not view.armed:
@@ -248,49 +252,72 @@ class Sequencer:
             self._taken(time_s, self._mode.value, view)
         elif waited > ENGAGE_TIMEOUT_S:
             self.end(time_s, f"the vehicle did not enter offboard within {ENGAGE_TIMEOUT_S:.0f} s")
-        elif waited > STREAM_BEFORE_OFFBOARD_S and self._asked is None and time_s - self._asked_s > RETRY_S:
-            self._ask(time_s, Request(RequestKind.OFFBOARD), requests)
+        elif waited > STREAM_BEFORE_OFFBOARD_S and self._asking.may_ask(time_s, RETRY_S):
+            self._asking.ask(time_s, Request(RequestKind.OFFBOARD), requests)
+
+    def _landed(self, time_s: float) -> None:
+        """Whoever had the vehicle has landed it: the mission begins anew with the pilot's next flight, or is over."""
+        self.streaming = False
+        if self.engage is Engage.PILOT:
+            self.taken_over = False
+            self._enter(time_s, Phase.PREFLIGHT)
+        else:
+            self._abort(time_s, "the vehicle was taken over and has landed")
 
     def _legs(self, time_s: float, view: VehicleView, legs_done: bool, requests: list[Request]) -> None:
-        self.streaming = not self._stale
+        self.streaming = not self.silence.stale
+        if self.silence.stale:
+            return
         if not view.armed:
             self._abort(time_s, "the vehicle has disarmed in flight")
-        elif self._left_offboard(view):
-            self._taken(time_s, "offboard", view)
+        elif self._left_offboard(time_s, view):
+            self._offboard_since_s = None
+            self.taken_over = True
+            text = f"the vehicle left offboard for {view.mode.value}: the pilot, or a failsafe of PX4, has it"
+            self.announcements.append((3, f"{text}; the next switch to offboard takes the mission up"))
+            self._enter(time_s, Phase.ENGAGE)
         elif legs_done:
             self._enter(time_s, Phase.ENDING)
             self._ending(time_s, view, requests)
 
     def _ending(self, time_s: float, view: VehicleView, requests: list[Request]) -> None:
-        action = _ENDING_REQUESTS[self.ending]
+        action, asking = _ENDING_REQUESTS[self.ending], self._asking
         landed = view.vehicle is not None and not view.in_air and not view.armed
-        if view.in_air and view.mode is not self._mode and view.mode not in _ENDING_MODES[self.ending]:
+        mode_known = not self.silence.stale and not self.silence.just_ended(time_s)
+        foreign = view.mode is not self._mode and view.mode not in _ENDING_MODES[self.ending]
+        if view.in_air and mode_known and foreign:
             self._taken(time_s, self._mode.value, view)
             return
-        if not self._accepted:
-            self.streaming = self.in_offboard and not self._stale
-            if self._asked is None and time_s - self._asked_s > RETRY_S:
-                first = RequestKind.HOLD if self._abort_reason and not self._hold_refused else action
-                self._ask(time_s, Request(first), requests)
+        if not asking.accepted:
+            # PX4 that refuses everything is left to its failsafe: that lands without a position too
+            given_up = asking.refused.get(action, 0) >= REFUSALS
+            self.streaming = self.in_offboard and not self.silence.stale and not given_up
+            if asking.may_ask(time_s, RETRY_S):
+                hold_first = bool(self._abort_reason) and RequestKind.HOLD not in asking.refused
+                asking.ask(time_s, Request(RequestKind.HOLD if hold_first else action), requests)
         else:
             self.streaming = False
             self._offboard_since_s = None
-            if action not in self._accepted and self._asked is None and time_s - self._asked_s > 2.0 * RETRY_S:
-                self._ask(time_s, Request(action), requests)
-            if action in self._accepted and (self.ending is EndingAction.HOLD or landed):
+            if action not in asking.accepted and asking.may_ask(time_s, 2.0 * RETRY_S):
+                asking.ask(time_s, Request(action), requests)
+            if action in asking.accepted and (self.ending is EndingAction.HOLD or landed):
                 self._finish(time_s)
                 return
-        if time_s - self._entered_s > LANDING_TIMEOUT_S:
+        if landed and asking.refused.get(action, 0) >= REFUSALS:
+            self._finish(time_s)
+        elif time_s - self._entered_s > LANDING_TIMEOUT_S:
             self._abort(time_s, f"the ending ({self.ending.value}) was not finished within {LANDING_TIMEOUT_S:.0f} s")
 
     # ------------------------------------------------------------------ parts
 
-    def _left_offboard(self, view: VehicleView) -> bool:
-        if view.vehicle is None or self._offboard_since_s is None or self._stale:
+    def _left_offboard(self, time_s: float, view: VehicleView) -> bool:
+        if view.vehicle is None or self._offboard_since_s is None:
             return False
         if view.mode is FlightMode.OFFBOARD:
             self._mode_seen = True
             return False
+        if self.silence.just_ended(time_s):
+            return False  # PX4 comes back from its own failsafe when setpoints do
         return self._mode_seen or view.vehicle.time_s > self._offboard_since_s + HEARTBEAT_GRACE_S
 
     def _taken(self, time_s: float, left: str, view: VehicleView) -> None:
@@ -298,32 +325,36 @@ class Sequencer:
         self._abort(time_s, f"the vehicle left {left} for {view.mode.value}: the pilot, or a failsafe of PX4, has it")
 
     def _watch_telemetry(self, time_s: float, view: VehicleView) -> None:
-        if self.phase not in (Phase.ENGAGE, Phase.LEGS, Phase.ENDING):
+        self.silence_ended = False
+        if view.rebooted:
+            self._rebooted(time_s)
+        if self.phase not in (Phase.TAKEOFF, Phase.ENGAGE, Phase.LEGS, Phase.ENDING):
+            self.silence = Silence(self.telemetry)
             return
-        age = view.odometry_age_s(time_s)
-        if not age <= STALE_S and not self._stale:
-            self._stale = True
-            self.announcements.append((3, f"telemetry is {age:.1f} s old: no setpoints until it is back"))
-        elif age <= STALE_S and self._stale:
-            self._stale = False
-            self.announcements.append((4, "telemetry is back"))
-        if age > LOST_S and self.phase is not Phase.ENDING:
-            self._abort(time_s, f"no telemetry for {LOST_S:.0f} s")
+        lasted, texts = self.silence.update(time_s, view.odometry_age_s(time_s), view.heartbeat_s)
+        self.announcements += texts
+        if lasted is not None and self.phase is Phase.LEGS:
+            if lasted <= self.telemetry.resume_within_s:
+                self.silence_ended = True
+            else:
+                ending = EndingAction.HOLD if self.engage is Engage.PILOT else None
+                self.end(time_s, f"nothing was heard for {lasted:.0f} s", ending)
+        if self.silence.lasts_s(time_s) > self.telemetry.give_up_s:
+            self._abort(time_s, f"no telemetry for {self.telemetry.give_up_s:.0f} s")
 
-    def _ask(self, time_s: float, request: Request, requests: list[Request]) -> None:
-        self._asked, self._asked_s = request, time_s
-        requests.append(request)
+    def _rebooted(self, time_s: float) -> None:
+        """A vehicle that starts again in flight falls: there is nothing to send, and nobody to hand over to."""
+        if self.phase is Phase.PREFLIGHT:
+            self.announcements.append((4, "the vehicle has restarted"))
+            self._enter(time_s, Phase.CONNECT)
+        elif self.phase not in (Phase.CONNECT, Phase.DONE, Phase.ABORTED):
+            self._abort(time_s, "the vehicle has restarted in flight")
 
     def _answered(self, time_s: float, result: RequestResult) -> None:
-        if self._asked is None or result.request.kind is not self._asked.kind:
-            return
-        self._asked = None
         if result.accepted:
-            self._accepted.add(result.request.kind)
             return
         text = f"{result.request.kind.value} was refused: {result.text}"
         if self.phase is not Phase.TAKEOFF:
-            self._hold_refused = self.phase is Phase.ENDING and result.request.kind is RequestKind.HOLD
             self.announcements.append((4, text))
         elif result.request.kind is RequestKind.ARM:
             self._abort(time_s, text)
@@ -332,10 +363,9 @@ class Sequencer:
 
     def _enter(self, time_s: float, phase: Phase) -> None:
         self.phase, self._entered_s = phase, time_s
-        self._asked, self._ready_since_s, self._unready_since_s = None, None, None
-        self._mode_seen = self._hold_refused = False
-        self._asked_s = time_s - RETRY_S
-        self._accepted.clear()
+        self._ready_since_s = self._unready_since_s = None
+        self._mode_seen = False
+        self._asking.reset(time_s, RETRY_S)
         self.announcements.append((6, f"phase {phase.value}"))
 
     def _finish(self, time_s: float) -> None:
@@ -349,13 +379,3 @@ class Sequencer:
         self._enter(time_s, Phase.ABORTED)
         self.reason = self._abort_reason or reason
         self.announcements.append((3, f"aborted: {reason}"))
-
-
-def _unready(view: VehicleView, estimate: StateEstimate | None) -> str:
-    """Why the vehicle is not ready, for the pilot."""
-    if view.health is not None and not (view.health.attitude_ok and view.health.velocity_ok):
-        return "PX4's estimator reports no attitude or velocity"
-    if estimate is None:
-        return "no estimate"
-    velocity, position = float(estimate.velocity_sigma_m_s.max()), float(estimate.position_sigma_m.max())
-    return f"velocity is known to {velocity:.2f} m/s, position to {position:.2f} m"

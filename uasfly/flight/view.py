@@ -10,6 +10,8 @@ from uasfly.messages import (
     BatterySample,
     FlightMode,
     HealthSample,
+    LinkEvent,
+    LinkSample,
     OdometrySample,
     RequestResult,
     Sample,
@@ -20,13 +22,19 @@ from uasfly.messages import (
 
 @dataclass(slots=True)
 class VehicleView:
-    """Last sample of each kind to arrive, and the answers and texts that came with the last step."""
+    """Last sample of each kind to arrive, and the answers and texts that came with the last step.
+
+    Attributes:
+        odometry: the last that can be flown by: attitude and velocity are numbers.
+        rebooted: the vehicle has started again since the last step.
+    """
 
     odometry: OdometrySample | None = None
     vehicle: VehicleSample | None = None
     battery: BatterySample | None = None
     health: HealthSample | None = None
     attitude_target: AttitudeTargetSample | None = None
+    rebooted: bool = False
     results: list[RequestResult] = field(default_factory=list)
     texts: list[TextSample] = field(default_factory=list)
 
@@ -34,10 +42,12 @@ class VehicleView:
         """Take in a step's samples; results and texts are those of this step only."""
         self.results.clear()
         self.texts.clear()
+        self.rebooted = False
         for sample in samples:
             match sample:
                 case OdometrySample():
-                    self.odometry = sample
+                    if _is_usable(sample):
+                        self.odometry = sample
                 case VehicleSample():
                     self.vehicle = sample
                 case AttitudeTargetSample():
@@ -50,10 +60,17 @@ class VehicleView:
                     self.results.append(sample)
                 case TextSample():
                     self.texts.append(sample)
+                case LinkSample():
+                    self.rebooted |= sample.event is LinkEvent.REBOOTED
 
     def odometry_age_s(self, time_s: float) -> float:
         """Age of the last odometry, infinite before the first; one from the future is as wrong as one from the past."""
         return math.inf if self.odometry is None else abs(time_s - self.odometry.time_s)
+
+    @property
+    def heartbeat_s(self) -> float:
+        """Time of the last heartbeat, NaN before the first."""
+        return math.nan if self.vehicle is None else self.vehicle.time_s
 
     @property
     def in_air(self) -> bool:
@@ -76,3 +93,8 @@ class VehicleView:
         if self.battery is None or not math.isfinite(self.battery.voltage_v) or self.battery.voltage_v <= 0.0:
             return None
         return self.battery.voltage_v
+
+
+def _is_usable(sample: OdometrySample) -> bool:
+    total = float(sample.quaternion_body_to_world.sum()) + float(sample.velocity_in_world.sum())
+    return math.isfinite(total)

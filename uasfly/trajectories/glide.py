@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from uasfly.airframe import Limits
 from uasfly.messages import Array, ReferenceHorizon
+from uasfly.mission import Transition
+
+SHORTEST_S = 2.0
+PEAK_SPEED = 1.875  # of the profile, times way over duration
+PEAK_ACCELERATION = 5.774  # times way over duration squared
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,3 +49,20 @@ class Glide:
             reference.yaw_rad + share * self.yaw_offset_rad,
             reference.yaw_rate_rad_s + speed * self.yaw_offset_rad,
         )
+
+
+def glide_time_s(offset_m: Array, turn_rad: float, transition: Transition, limits: Limits) -> float:
+    """Time for a glide over an offset (3,) [m] and a turn [rad] within speeds, acceleration and yaw rate."""
+    x, y, z = offset_m.tolist()
+    way = math.sqrt(x * x + y * y + z * z)
+    speed = min(transition.speed_m_s, limits.speed_m_s)
+    acceleration = min(transition.acceleration_m_s2, limits.acceleration_m_s2)
+    vertical = limits.descent_m_s if z > 0.0 else limits.climb_m_s  # the glide goes against the offset
+    longest: float = max(
+        SHORTEST_S,
+        PEAK_SPEED * way / speed,
+        PEAK_SPEED * abs(z) / vertical,
+        math.sqrt(PEAK_ACCELERATION * way / acceleration),
+        PEAK_SPEED * abs(turn_rad) / limits.yaw_rate_rad_s,
+    )
+    return longest

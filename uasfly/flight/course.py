@@ -1,0 +1,206 @@
+"""Where the flight is to be: the point to hold at, the mission from there, its pace, and taking it up again."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uasfly.airframe import Limits
+from uasfly.frames import euler_from_quaternion, wrap_angle
+from uasfly.messages import Action, Array, ReferenceHorizon, StateEstimate
+from uasfly.mission import Mission
+from uasfly.trajectories.glide import Glide, glide_time_s
+from uasfly.trajectories.hold import HoldTrajectory
+from uasfly.trajectories.mission_trajectory import MissionTrajectory
+from uasfly.trajectories.pacing import Pacing
+from uasfly.trajectories.trajectory import TrajectoryError
+
+HOLD_RADIUS_M = 0.2  # while the vehicle engages, the point to hold at follows it beyond this distance
+HOLD_YAW_RAD = math.radians(10.0)  # and beyond this turn
+PLAN_AFTER_S = 0.2  # held for so long, the mission is planned from there
+TOO_FAR_M = 100.0  # from where the mission was left: nobody meant to take it up here
+
+
+class Course:
+    """References of one flight.
+
+    Args:
+        mission: what is flown.
+        limits: of the airframe.
+
+    Attributes:
+        origin: (3,) m, world: the mission's, once it is known.
+        problem: why the mission cannot be flown from here, "" while it can.
+    """
+
+    def __init__(self, mission: Mission, limits: Limits) -> None:
+        self._mission = mission
+        self._limits = limits
+        self.origin: Array | None = None
+        self.problem = ""
+        self._hold: HoldTrajectory | None = None
+        self._hold_since_s = 0.0
+        self._planned: MissionTrajectory | None = None  # starts where the vehicle holds while it engages
+        self._trajectory: MissionTrajectory | None = None  # the planned one, once the legs have begun
+        self._pacing = Pacing(0.0, 0.0, 0.0)
+        self._frozen = False
+        self._glide: Glide | None = None
+        self._action = Action.NOTHING
+        self._turned_back_s: float | None = None  # mission time at which the way back began
+
+    @property
+    def begun(self) -> bool:
+        """Whether the legs have begun, be they held or frozen."""
+        return self._trajectory is not None
+
+    @property
+    def home(self) -> Array | None:
+        """(3,) m, world: where it came from."""
+        return self.origin
+
+    def drop(self) -> None:
+        """Forget the mission's progress: it will begin anew."""
+        self._hold = self._planned = self._trajectory = self._glide = None
+        self._frozen, self._action, self._turned_back_s = False, Action.NOTHING, None
+
+    def engage(self, time_s: float, estimate: StateEstimate) -> None:
+        """Keep the point to hold at where the vehicle is, and the mission planned from there."""
+        if self._hold is None or _strayed(self._hold, estimate):
+            self.hold_here(time_s, estimate)
+        if not self.begun and self._planned is None and time_s - self._hold_since_s >= PLAN_AFTER_S:
+            self._plan()  # some tens of milliseconds of work, done while PX4 still flies the vehicle by itself
+
+    def hold_here(self, time_s: float, estimate: StateEstimate) -> None:
+        """Hold where the vehicle is now."""
+        _, _, yaw = euler_from_quaternion(estimate.quaternion_body_to_world)
+        self._hold, self._hold_since_s = HoldTrajectory(estimate.position_in_world, yaw), time_s
+        self._planned = None
+
+    def stay(self, time_s: float, estimate: StateEstimate) -> None:
+        """The mission is over: stay here."""
+        self._trajectory = None
+        self.hold_here(time_s, estimate)
+
+    def start(self, time_s: float, estimate: StateEstimate) -> None:
+        """Begin the mission, gliding from where the vehicle is."""
+        if self._hold is None or _strayed(self._hold, estimate):
+            self.hold_here(time_s, estimate)
+        if self._planned is None:
+            self._plan()
+        self._trajectory, self._frozen = self._planned, False
+        self._pacing = Pacing(time_s, 0.0, 1.0)
+        self._glide_in(time_s, estimate)
+
+    def freeze(self, time_s: float) -> None:
+        """Nobody follows the reference from `time_s` on: the mission's time stands."""
+        if not self._frozen and self._trajectory is not None:
+            self._pacing = Pacing(time_s, self._clipped(self._pacing.mission_time_s(time_s)), 0.0)
+            self._frozen, self._glide, self._turned_back_s = True, None, None
+
+    def take_up(self, time_s: float, estimate: StateEstimate) -> None:
+        """Go on with a frozen mission: back to where it was left, straight and from rest to rest, then on."""
+        assert self._trajectory is not None
+        self._frozen = False
+        self._glide_in(time_s, estimate)
+        assert self._glide is not None
+        if float(np.linalg.norm(self._glide.offset_m)) > TOO_FAR_M:
+            self.problem = f"more than {TOO_FAR_M:.0f} m away from where the mission was left"
+
+    def act(self, time_s: float, action: Action, slow_pace: float, back_off_m: float) -> None:
+        """Let the pace follow what the monitors want; call it each cycle while the legs fly."""
+        if self._trajectory is None or self._frozen:
+            return
+        if action is not Action.BACK_OFF:
+            self._turned_back_s = None
+        match action:
+            case Action.HOLD:
+                pace = 0.0
+            case Action.SLOW_DOWN:
+                pace = slow_pace
+            case Action.BACK_OFF:
+                pace = -slow_pace if self._way_back_left(time_s, back_off_m) else 0.0
+            case _:
+                pace = 1.0
+        arriving = self._glide is not None and time_s < self._glide.start_s + self._glide.duration_s
+        if arriving and self._pacing.target == 0.0 and pace > 0.0:
+            return  # on the way back to where the mission was left
+        self._pacing.change(time_s, pace)
+
+    def at(self, times_s: Array) -> ReferenceHorizon:
+        """Reference at absolute times (n,) [s, host], in the world frame."""
+        if self._trajectory is not None:
+            reference = self._pacing.onto(self._trajectory, times_s)
+            return reference if self._glide is None else self._glide.onto(reference)
+        assert self._hold is not None
+        return self._hold.sample(times_s)
+
+    def pace(self, time_s: float) -> float:
+        """Rate of the mission's time."""
+        return self._pacing.pace(time_s) if self._trajectory is not None else 0.0
+
+    def done(self, time_s: float) -> bool:
+        """Whether the reference has come to its end."""
+        return self._trajectory is not None and self._mission_s(time_s) >= self._trajectory.duration_s
+
+    def progress(self, time_s: float) -> float:
+        """0..1 of the mission's duration."""
+        if self._trajectory is None:
+            return 0.0
+        return min(1.0, max(0.0, self._mission_s(time_s) / self._trajectory.duration_s))
+
+    def leg(self, time_s: float) -> int:
+        """Index of the leg that the reference flies, -1 in transitions and outside."""
+        if self._trajectory is None:
+            return -1
+        mission_s = self._mission_s(time_s)
+        return self._trajectory.leg_at(mission_s) if self._trajectory.in_leg(mission_s) else -1
+
+    def _mission_s(self, time_s: float) -> float:
+        return self._pacing.mission_time_s(time_s)
+
+    def _clipped(self, mission_s: float) -> float:
+        assert self._trajectory is not None
+        return min(max(mission_s, 0.0), self._trajectory.duration_s)
+
+    def _plan(self) -> None:
+        assert self._hold is not None
+        assert self.origin is not None
+        try:
+            self._planned = MissionTrajectory(
+                self._mission,
+                self._limits,
+                start_position=self._hold.position_in_world,
+                start_yaw=self._hold.yaw_rad,
+                takeoff_in_world=self.origin,
+            )
+        except TrajectoryError as error:
+            self.problem = f"the mission cannot be flown from here: {error}"
+
+    def _glide_in(self, time_s: float, estimate: StateEstimate) -> None:
+        """Fade out what lies between the vehicle and the reference."""
+        self._glide = None
+        if self._trajectory is None:
+            return
+        now = self.at(np.array([time_s]))
+        _, _, yaw = euler_from_quaternion(estimate.quaternion_body_to_world)
+        offset = estimate.position_in_world - now.position_in_world[0]
+        turn = wrap_angle(yaw - float(now.yaw_rad[0]))
+        self._glide = Glide(offset, turn, time_s, glide_time_s(offset, turn, self._mission.transition, self._limits))
+
+    def _way_back_left(self, time_s: float, back_off_m: float) -> bool:
+        """Whether there is still way to go back."""
+        assert self._trajectory is not None
+        now_s = self._mission_s(time_s)
+        if self._turned_back_s is None:
+            self._turned_back_s = now_s
+        if now_s <= 0.0:
+            return False
+        here, there = self._trajectory.sample(np.array([now_s, self._turned_back_s])).position_in_world
+        return float(np.linalg.norm(here - there)) < back_off_m
+
+
+def _strayed(hold: HoldTrajectory, estimate: StateEstimate) -> bool:
+    way = estimate.position_in_world - hold.position_in_world
+    _, _, yaw = euler_from_quaternion(estimate.quaternion_body_to_world)
+    return float(way @ way) > HOLD_RADIUS_M**2 or abs(wrap_angle(yaw - hold.yaw_rad)) > HOLD_YAW_RAD

@@ -1,0 +1,50 @@
+"""Is the estimate good enough to fly by, next to a structure?"""
+
+from __future__ import annotations
+
+import math
+
+from uasfly.flight.monitors.watched import Watched
+from uasfly.messages import StateEstimate
+from uasfly.monitor_settings import EstimateMonitor
+
+
+class UncertainEstimate:
+    """The estimate is uncertain, or its sensors contradict each other."""
+
+    def __init__(self, settings: EstimateMonitor) -> None:
+        """Take the thresholds."""
+        self._settings = settings
+
+    def __call__(self, watched: Watched) -> str:
+        """What is wrong with it."""
+        settings, diagnosis = self._settings, watched.diagnosis
+        position, velocity = float(diagnosis.position_sigma_m.max()), float(diagnosis.velocity_sigma_m_s.max())
+        if not position <= settings.position_sigma_m:
+            return f"position known to {position:.2f} m only"
+        if not velocity <= settings.velocity_sigma_m_s:
+            return f"velocity known to {velocity:.2f} m/s only"
+        # A position that is refused is an error of GNSS and has its own monitors; position and velocity refused
+        # together are a gust that pushes harder than the model can explain.
+        shares = diagnosis.rejected_share
+        pushed = shares.get("position", 0.0) > 0.5 * shares.get("velocity", 0.0)
+        for sensor in ("velocity", "attitude"):
+            share = shares.get(sensor, 0.0)
+            if share > settings.rejected_share and not (sensor == "velocity" and pushed):
+                return f"{share * 100.0:.0f} % of PX4's {sensor} contradicts the estimate"
+        return ""
+
+
+def not_finite(watched: Watched) -> str:
+    """Numbers that are none."""
+    return "" if _is_finite(watched.estimate) else "the estimate is not finite"
+
+
+def _is_finite(estimate: StateEstimate) -> bool:
+    total = (
+        float(estimate.position_in_world.sum())
+        + float(estimate.velocity_in_world.sum())
+        + float(estimate.quaternion_body_to_world.sum())
+        + float(estimate.force_in_world.sum())
+    )
+    return math.isfinite(total)

@@ -1,0 +1,53 @@
+"""All monitors of one mission."""
+
+from __future__ import annotations
+
+from uasfly.airframe import Airframe
+from uasfly.flight.monitors.battery import BatteryEnds, BatteryLow
+from uasfly.flight.monitors.estimate import UncertainEstimate, not_finite
+from uasfly.flight.monitors.gnss import GnssDegraded, GnssDrift, GnssJump, GnssLost
+from uasfly.flight.monitors.motion import FarFromReference, OutsideAltitudes, OutsideFence, Tilted
+from uasfly.flight.monitors.solver import Fallbacks
+from uasfly.flight.monitors.watch import Watch
+from uasfly.flight.monitors.watched import Watched
+from uasfly.flight.monitors.wind import BeyondWindLimit, CannotHold, CannotReturn, WindTakesMuch
+from uasfly.messages import Alarm
+from uasfly.mission import Mission
+from uasfly.monitor_settings import Monitor
+
+_AT_ONCE = Monitor(action="hand_over", after_s=0.0)
+
+
+class Monitors:
+    """Looks at everything that the mission file's section `monitors` names, once a cycle."""
+
+    def __init__(self, mission: Mission, airframe: Airframe) -> None:
+        """Take thresholds, limits and speeds."""
+        s, limits = mission.monitors, mission.limits
+        fallbacks = Fallbacks(s.solver)
+        told = Monitor(action="warn", after_s=s.wind.after_s, clear_s=5.0)
+        self._watches = (
+            Watch("estimate", _AT_ONCE, not_finite),
+            Watch("estimate", s.estimate, UncertainEstimate(s.estimate)),
+            Watch("gnss_lost", s.gnss_lost, GnssLost(), flying_only=False),
+            Watch("gnss_degraded", s.gnss_degraded, GnssDegraded(s.gnss_degraded), flying_only=False),
+            Watch("gnss_jump", s.gnss_jump, GnssJump(s.gnss_jump)),
+            Watch("gnss_drift", s.gnss_drift, GnssDrift(s.gnss_drift)),
+            Watch("geofence", s.geofence, OutsideFence(limits, s.geofence)),
+            Watch("altitude", s.altitude, OutsideAltitudes(limits, s.altitude)),
+            Watch("tracking", s.tracking, FarFromReference(s.tracking)),
+            Watch("tilt", s.tilt, Tilted(airframe, s.tilt)),
+            Watch("battery", Monitor(action="warn", after_s=1.0), BatteryLow(s.battery), flying_only=False),
+            Watch("battery", s.battery, BatteryEnds(s.battery, mission, airframe), flying_only=False),
+            Watch("wind", told, BeyondWindLimit(mission, airframe)),
+            Watch("wind", told, WindTakesMuch(s.wind)),
+            Watch("wind", told, CannotReturn(s.wind)),
+            Watch("wind", s.wind, CannotHold(s.wind)),
+            Watch("solver", Monitor(action="warn", after_s=0.0), fallbacks.late),
+            Watch("solver", s.solver, fallbacks.backup),
+        )
+
+    def check(self, watched: Watched) -> tuple[Alarm, ...]:
+        """What is an alarm now, the mission's order of monitors."""
+        alarms = [watch.check(watched) for watch in self._watches]
+        return tuple(alarm for alarm in alarms if alarm is not None)

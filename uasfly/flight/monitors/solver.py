@@ -1,0 +1,48 @@
+"""Does the solver keep up?"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from uasfly.flight.monitors.watched import Watched
+from uasfly.monitor_settings import SolverMonitor
+
+FEWEST_STEPS = 10
+
+
+class Fallbacks:
+    """What has flown in the last steps: the solver, its last plan, or the backup."""
+
+    def __init__(self, settings: SolverMonitor) -> None:
+        """Take the window."""
+        self._settings = settings
+        self._steps: deque[tuple[float, str]] = deque()
+        self._counts = {"": 0, "plan": 0, "backup": 0}
+
+    def late(self, watched: Watched) -> str:
+        """Looks at the step too: call this one first in each cycle."""
+        self._add(watched)
+        share = self._share("plan", "backup")
+        if share > self._settings.late_share:
+            return f"the solver is late or fails in {share * 100.0:.0f} % of the steps"
+        return ""
+
+    def backup(self, watched: Watched) -> str:
+        """Whether the backup flies too much."""
+        del watched
+        share = self._share("backup")
+        if share > self._settings.backup_share:
+            return f"the solver fails: the backup flies {share * 100.0:.0f} % of the time"
+        return ""
+
+    def _add(self, watched: Watched) -> None:
+        if watched.control is not None:
+            fallback = watched.control.fallback
+            self._steps.append((watched.time_s, fallback))
+            self._counts[fallback] += 1
+        while self._steps and self._steps[0][0] < watched.time_s - self._settings.window_s:
+            self._counts[self._steps.popleft()[1]] -= 1
+
+    def _share(self, *kinds: str) -> float:
+        count = len(self._steps)
+        return sum(self._counts[kind] for kind in kinds) / count if count >= FEWEST_STEPS else 0.0
