@@ -60,13 +60,17 @@ class HoveringLink:
         answers, self._answers = self._answers, []
         return (OdometrySample(now, zero, zero, level, zero), VehicleSample(now, self.mode, True, True), *answers)
 
-    def send(self, setpoint: Setpoint) -> None:
+    def send_text(self, severity: int, text: str) -> None:
+        """Nobody listens."""
+
+    def send(self, setpoint: Setpoint) -> bool:
         """Count."""
         if self.fault == "send" and self._breaks():
             raise ValueError("a setpoint must be finite")
         self.setpoints_in_offboard += self.mode is FlightMode.OFFBOARD
         while self.signals and self._breaks():
             os.kill(os.getpid(), self.signals.pop())
+        return True
 
     def request(self, request: Request) -> None:
         """Obey."""

@@ -117,6 +117,8 @@ def test_setpoints_do_not_jump_in_gusts_that_cannot_be_held(tmp_path: Path) -> N
     Planned against the force as estimated, this flight has 50 jumps of roll and 29 of thrust.
     """
     settings = ["scenario.wind.mean.speed_at_10_m_m_s=14", "mission.legs[0].duration_s=15"]
+    settings += [f"mission.monitors.{name}.action=warn" for name in ("wind", "tracking", "geofence", "altitude")]
+    settings += ["mission.monitors.tracking.then=warn"]
     log = tmp_path / "strong.mcap"
     rehearse(load_plan("hover", "f550", scenario="gusty", seed=2, settings=settings), log)
     setpoints = [entry.message for entry in LogReader(log).messages() if isinstance(entry.message, Setpoint)]

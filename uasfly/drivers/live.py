@@ -17,11 +17,12 @@ from uasfly.errors import describe_error
 from uasfly.flight.pilot import Pilot, StepResult
 from uasfly.flight.summary import SummaryCollector
 from uasfly.link.protocol import VehicleLink
-from uasfly.messages import Phase, Request, RequestKind, RequestResult, Sample, Status
+from uasfly.messages import Phase, Request, RequestKind, RequestResult, Sample, Setpoint, Status
 from uasfly.record.writer import BackgroundLogWriter
 
 HAND_OVER_S = 2.5  # time for the last request to be repeated and answered
 HAND_OVER_POLL_S = 0.05
+TOLD_SEVERITY = 5  # and worse: notice, warning, error ...
 
 
 async def fly(
@@ -106,8 +107,7 @@ class _LiveFlight:
         samples = self._link.poll()
         result = self._pilot.step(begun, samples)
         if result.setpoint is not None:
-            self._link.send(result.setpoint)
-            self.summary.setpoint_sent(time.monotonic())
+            self._send(result.setpoint)
         for request in result.requests:
             self._link.request(request)
         cycle_ms = (time.monotonic() - begun) * 1e3
@@ -117,9 +117,23 @@ class _LiveFlight:
         solve_ms = None if result.control is None else result.control.solve_ms
         self.summary.timed(solve_ms, cycle_ms)
         self.summary.cycle(result.status, samples)
+        self._tell_ground(result.status)
         self._record(result, samples)
         if self._watch is not None:
             self._watch(result.status, solve_ms)
+
+    def _send(self, setpoint: Setpoint) -> None:
+        """A setpoint that has become old on its way here (the process was stopped) does not leave."""
+        if self._link.send(setpoint):
+            self.summary.setpoint_sent(time.monotonic())
+        else:
+            self._pilot.announce(3, "a setpoint was too old to be sent: this computer or the process was stopped")
+
+    def _tell_ground(self, status: Status) -> None:
+        """The ground station hears what the pilot at the screen does, but for the small talk."""
+        for severity, text in status.announcements:
+            if severity <= TOLD_SEVERITY:
+                self._link.send_text(severity, f"uasfly: {text}")
 
     def _record(self, result: StepResult, samples: tuple[Sample, ...]) -> None:
         if self._writer is not None:

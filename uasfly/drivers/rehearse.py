@@ -58,7 +58,7 @@ def rehearse(
             cycle += 1
             now_s = cycle * period_s
             link.advance_to(now_s)
-            truth = vehicle.truth()
+            truth = link.truth()
             samples = link.poll()
             begun = time.perf_counter()
             result = pilot.step(now_s, samples)

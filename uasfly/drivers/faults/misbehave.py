@@ -1,0 +1,73 @@
+"""Lets the running program misbehave from inside, for the fault table: a cycle that hangs, a solver that fails.
+
+Run as `python -m uasfly.drivers.faults.misbehave hang|fail SECONDS_AFTER_LEGS DURATION ARGUMENTS...`; the rest is the
+command line of uasfly.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import time
+
+from uasfly.control.nmpc_controller import NmpcController
+from uasfly.control.qp import SolveStatus
+from uasfly.flight.pilot import Pilot, StepResult
+from uasfly.messages import Phase, Sample
+
+
+class _Window:
+    """From so long after the legs began, for a duration."""
+
+    def __init__(self, begin_s: float, duration_s: float) -> None:
+        self.begin_s, self.duration_s = begin_s, duration_s
+        self.legs_s: float | None = None
+
+    def holds(self, time_s: float) -> bool:
+        """Whether it is open."""
+        return self.legs_s is not None and 0.0 <= time_s - self.legs_s - self.begin_s < self.duration_s
+
+
+def hang(window: _Window) -> None:
+    """Let one step take as long as the window; everything else of the process goes on."""
+    step = Pilot.step
+
+    def hanging(self: Pilot, time_s: float, samples: tuple[Sample, ...]) -> StepResult:
+        result = step(self, time_s, samples)
+        _note(self, window, time_s)
+        if window.holds(time_s):
+            time.sleep(window.duration_s)
+            window.duration_s = 0.0  # once
+        return result
+
+    Pilot.step = hanging  # type: ignore[method-assign]
+
+
+def failing_solver(window: _Window) -> None:
+    """Let every solve in the window fail."""
+    step, choose = Pilot.step, NmpcController._choose
+    now = [0.0]
+
+    def noting(self: Pilot, time_s: float, samples: tuple[Sample, ...]) -> StepResult:
+        now[0] = time_s
+        result = step(self, time_s, samples)
+        _note(self, window, time_s)
+        return result
+
+    def failing(self: NmpcController, status: SolveStatus, solve_s: float, acts_s: float) -> object:
+        return choose(self, SolveStatus.FAILED if window.holds(now[0]) else status, solve_s, acts_s)
+
+    Pilot.step = noting  # type: ignore[method-assign]
+    NmpcController._choose = failing  # type: ignore[method-assign, assignment]
+
+
+def _note(pilot: Pilot, window: _Window, time_s: float) -> None:
+    if window.legs_s is None and pilot.sequencer.phase is Phase.LEGS:
+        window.legs_s = time_s
+
+
+if __name__ == "__main__":
+    what, begin, duration = sys.argv[1:4]
+    {"hang": hang, "fail": failing_solver}[what](_Window(float(begin), float(duration)))
+    sys.argv[1:] = sys.argv[4:]
+    importlib.import_module("uasfly.cli.main").main()
