@@ -125,11 +125,13 @@ class _Program:
             summary = json.loads(self._summary.read_text())
             story.words.append((time.monotonic(), summary["outcome"]))
             story.reason = summary["reason"]
-            story.texts += [(time.monotonic(), text) for text in summary["warnings"]]
         elif not ended and self._case.act is Act.KILL:
             story.words.append((self.acted_s, "killed"))
             last = self._wire.modes[-1] if self._wire.modes else (math.nan, FlightMode.OTHER)
             story.words.append((last[0], f"vehicle in {last[1].value}"))
+        if not ended:  # the log broke off: the wire tells what it does not
+            story.ended_s = self._wire.left_offboard_s()
+            story.texts += self._wire.texts
         if math.isnan(story.ended_s) and story.truths:
             story.ended_s = story.truths[-1].time_s
         return story
