@@ -117,6 +117,8 @@ class PositionControl:
         self._last_acceleration_z = acceleration_z
 
         low, high = self._thrust_range
+        if setpoint.climb_limit_m_s < math.inf:
+            low = 0.0  # PX4 takes the lower limit for flight only
         flat = math.hypot(acceleration_x, acceleration_y)
         slope = min(flat / GRAVITY_M_S2, math.tan(tilt_limit_rad))
         lift = max(_SMALLEST_THRUST, hover_thrust * (1.0 + acceleration_z / GRAVITY_M_S2))
@@ -132,7 +134,7 @@ class PositionControl:
         if setpoint.track_horizontal:
             self._integrate_horizontal(error_x, error_y, acceleration_x, acceleration_y, reached, flat)
         share = side / flat if flat > 1e-9 else 0.0
-        thrust = max(math.hypot(side, lift), 0.0 if setpoint.climb_limit_m_s < math.inf else low)
+        thrust = max(math.hypot(side, lift), low)
         attitude = _attitude(share * acceleration_x, share * acceleration_y, lift, setpoint.yaw_rad)
         return AttitudeSetpoint(attitude, min(thrust, high))
 
