@@ -129,6 +129,14 @@ def test_state_has_a_word_and_a_colour(changes: dict[str, object], word: str, co
     assert f"on {colour}" in _style_of(of, word, width=40)
 
 
+def test_outside_a_leg_the_progress_is_named_after_the_phase() -> None:
+    """And an aborted mission has none left."""
+    assert "between legs" in _text(scene(status(leg=-1)))
+    assert " engage " in _text(scene(status(phase=Phase.ENGAGE, leg=-1)))
+    aborted = _text(scene(status(phase=Phase.ABORTED, leg=-1, progress=1.0, reason="stopped by Ctrl-C")))
+    assert "100 % " not in aborted.split("messages")[0].split("aborted ")[-1]
+
+
 def test_an_action_says_why() -> None:
     """The text of the alarm that acts, not of a milder one."""
     mild = Alarm("wind", Action.WARN, 4, "wind takes 76 %")

@@ -7,7 +7,7 @@ import math
 from uasfly.cli.blocks import Row, row
 from uasfly.cli.gauges import GREEN, RED, UNKNOWN, YELLOW, bar, graded, length, number
 from uasfly.cli.scene import Scene
-from uasfly.messages import Authority, Status
+from uasfly.messages import Authority, Phase, Status
 
 LABEL = "cyan"
 _LABEL_WIDTH = 10
@@ -169,7 +169,7 @@ def leg(scene: Scene) -> str:
     """Number and name of the leg."""
     index, count = scene.status.leg, len(scene.legs)
     if index < 0:
-        return scene.status.phase.value if scene.status.progress in (0.0, 1.0) else "between legs"
+        return "between legs" if scene.status.phase is Phase.LEGS else scene.status.phase.value
     name = f" · {scene.legs[index]}" if index < count else ""
     return f"leg {index + 1}" + (f" of {count}" if count else "") + name
 
