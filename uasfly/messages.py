@@ -325,7 +325,7 @@ class Status:
         leg_started: the first leg has begun and the last has not ended: tracking counts.
         progress: 0..1 of the legs' duration. estimate: None until the observer has started.
         reference_position_in_world: (3,) or None outside the legs.
-        reason: why the flight ended early, "" otherwise.
+        reason: why the flight ends or has ended early, "" otherwise.
         fallback: name of what replaced the solver's answer in this step, "" when nothing did.
         announcements: new texts for the pilot, with their severity as in MAVLink.
         mode, armed: the vehicle's, as last heard.
@@ -334,6 +334,7 @@ class Status:
         authority: None until there is an estimate.
         alarms: what the monitors find now. action: the highest of theirs, which is being done.
         pace: rate at which the mission's own time runs: 1 as planned, 0 held, negative on the way back.
+        pilot_flies: the mission waits, because somebody else has the vehicle until it is switched to offboard.
     """
 
     time_s: float
@@ -355,3 +356,4 @@ class Status:
     alarms: tuple[Alarm, ...] = ()
     action: Action = Action.NOTHING
     pace: float = 1.0
+    pilot_flies: bool = False

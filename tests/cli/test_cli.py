@@ -38,6 +38,7 @@ def test_every_command_explains_itself_with_an_example(command: str) -> None:
         (("rehearse", "hover", "--set", "speed"), "expected key=value"),
         (("rehearse", "hover", "--log", "missing/flight.mcap"), "folder for the flight log does not exist"),
         (("rehearse", "hover", "--summary", "missing/s.json"), "folder for the summary does not exist"),
+        (("rehearse", "hover", "--capture", "missing/v.svg"), "folder for the picture does not exist"),
         (("hover", "--scenario", "gusty"), "add --sim"),
         (("hover", "--sim", "--engage", "robot"), "expected auto or pilot"),
         (("hover", "--connect", "carrier-pigeon://coop"), "accepted forms"),
@@ -113,14 +114,14 @@ def test_schema_is_valid_json_schema(kind: str) -> None:
 
 
 def test_rehearse_prints_and_writes_its_summary(tmp_path: Path) -> None:
-    """--json and --summary hold the same; exit code 0 for a completed flight."""
-    path = tmp_path / "summary.json"
-    result = _run(
-        "rehearse", "hover", "--set", "mission.legs[0].duration_s=1", "--json", "--summary", str(path), timeout_s=300.0
-    )
+    """--json and --summary hold the same, --capture a picture of it; exit code 0 for a completed flight."""
+    path, picture = tmp_path / "summary.json", tmp_path / "view.svg"
+    files = ("--summary", str(path), "--capture", str(picture))
+    result = _run("rehearse", "hover", "--set", "mission.legs[0].duration_s=1", "--json", *files, timeout_s=300.0)
     assert result.returncode == 0, result.stderr
     assert json.loads(result.stdout) == json.loads(path.read_text())
     assert json.loads(result.stdout)["outcome"] == "completed"
+    assert ">hover<" in picture.read_text(encoding="utf-8")
 
 
 def test_an_aborted_flight_exits_with_1() -> None:

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import errno
 import io
-import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 from rich.console import Console
 
+from tests.cli.scenes import status, unknown
 from uasfly.cli.live_view import LiveView
 from uasfly.cli.output import finish, summary_table
+from uasfly.drivers.watching import Cycle
 from uasfly.errors import FileError
 from uasfly.flight.summary import SummaryCollector
-from uasfly.messages import Phase, StateEstimate, Status
+from uasfly.messages import Phase, Status
 
-ZERO = np.zeros(3)
-LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+CYCLE = Cycle(True, 2.0, 1.25)
+ENTER, LEAVE = "\x1b[?1049h", "\x1b[?1049l"
+HIDE_CURSOR, SHOW_CURSOR = "\x1b[?25l", "\x1b[?25h"
 
 
 class Screen(io.StringIO):
@@ -33,35 +34,18 @@ class Screen(io.StringIO):
         return super().write(text)
 
 
+class Clock:
+    """Tells the time that the test wants."""
+
+    now_s = 0.0
+
+    def __call__(self) -> float:
+        """Now."""
+        return self.now_s
+
+
 def _console(screen: Screen, terminal: bool) -> Console:
     return Console(file=screen, force_terminal=terminal, width=100, color_system=None)
-
-
-def _status(
-    time_s: float,
-    *,
-    estimate: bool = True,
-    force: tuple[float, float, float] = (1.5, 0.0, -0.2),
-    fallback: str = "",
-    announcements: tuple[tuple[int, str], ...] = (),
-) -> Status:
-    known = StateEstimate(
-        time_s,
-        np.array([1.0, -2.0, 1.5]),
-        ZERO,
-        LEVEL,
-        ZERO,
-        np.array(force),
-        ZERO,
-        np.full(3, 0.02),
-        ZERO,
-        ZERO,
-    )
-    reference = np.array([1.0, -2.0, 1.56]) if estimate else None
-    phase = Phase.LEGS if estimate else Phase.CONNECT
-    return Status(
-        time_s, phase, 1, True, 0.25, known if estimate else None, reference, fallback, announcements=announcements
-    )
 
 
 def test_without_a_terminal_there_are_plain_lines_now_and_then() -> None:
@@ -69,7 +53,7 @@ def test_without_a_terminal_there_are_plain_lines_now_and_then() -> None:
     screen = Screen()
     with LiveView("hover", "f550", _console(screen, terminal=False)) as view:
         for k in range(601):
-            view.update(_status(0.02 * k), 1.0)
+            view.update(status(0.02 * k), CYCLE)
     lines = screen.getvalue().splitlines()
     assert len(lines) == 3
     for word in ("legs", "25 %", "+1.00 -2.00 +1.50 m", "error 6.0 cm", "force +1.50 +0.00 -0.20 m/s²"):
@@ -81,91 +65,99 @@ def test_without_a_terminal_every_announcement_is_a_line() -> None:
     """Also between the regular lines, with its time."""
     screen = Screen()
     with LiveView("hover", "f550", _console(screen, terminal=False)) as view:
-        view.update(_status(10.0))
-        view.update(_status(10.5, announcements=((4, "gust [/red] over legs[0]"), (6, "phase ending"))))
+        view.update(status(10.0), CYCLE)
+        view.update(status(10.5, announcements=((4, "gust [/red] over legs[0]"), (6, "phase ending"))), CYCLE)
     lines = screen.getvalue().splitlines()
     assert lines[1:] == ["[     10.50] gust [/red] over legs[0]", "[     10.50] phase ending"]
 
 
-def _drawn(status: Status, solve_ms: float | None = 1.25, announcements: tuple[tuple[int, str], ...] = ()) -> str:
-    """What a terminal shows of a step."""
+def test_a_terminal_shows_the_picture_on_its_other_screen() -> None:
+    """What was on it before is there again afterwards, with the cursor."""
     screen = Screen()
-    console = _console(screen, terminal=True)
-    view = LiveView("hover", "f550", console)
-    view.update(_status(0.0, announcements=announcements))
-    screen.seek(0)
-    screen.truncate()
-    console.print(view.render(status, solve_ms))
-    return screen.getvalue()
+    with LiveView("hover", "f550", _console(screen, terminal=True)) as view:
+        view.say("connecting")
+        assert ENTER not in screen.getvalue()
+        view.update(status(), CYCLE)
+    text = screen.getvalue()
+    assert text.index("connecting") < text.index(ENTER) < text.index("uasfly · hover · f550") < text.index(LEAVE)
+    assert text.index(LEAVE) > text.rindex("uasfly · hover · f550")
+    assert text.rindex(SHOW_CURSOR) > text.rindex(HIDE_CURSOR)
 
 
-def test_a_terminal_shows_phase_position_error_force_and_solver() -> None:
-    """All of it in one picture, the last texts below."""
-    text = _drawn(_status(1.0), announcements=((3, "telemetry is 0.6 s old"), (6, "phase legs")))
-    assert "uasfly · hover · f550" in text
-    assert "legs, leg 2" in text
-    assert "east   +1.00  north   -2.00  up   +1.50 m" in text
-    assert "± 2.0 cm" in text
-    assert "6.0 cm" in text
-    assert "→ 1.50 m/s²  up -0.20 m/s²" in text
-    assert "1.25 ms" in text
-    assert "fallback" not in text
-    assert "telemetry is 0.6 s old" in text
+def test_leaving_without_a_step_leaves_the_terminal_alone() -> None:
+    """No vehicle: an error message follows, on the screen where the command was typed."""
+    screen = Screen()
+    with pytest.raises(ZeroDivisionError), LiveView("hover", "f550", _console(screen, terminal=True)):
+        raise ZeroDivisionError
+    assert screen.getvalue() == ""
 
 
-@pytest.mark.parametrize(
-    ("degrees", "arrow"), [(0, "→"), (45, "↗"), (90, "↑"), (135, "↖"), (180, "←"), (225, "↙"), (270, "↓"), (315, "↘")]
-)
-def test_the_arrow_points_where_the_wind_pushes_on_a_map(degrees: int, arrow: str) -> None:
-    """East is right and north is up."""
-    angle = math.radians(degrees)
-    assert f"{arrow} 2.00 m/s²" in _drawn(_status(1.0, force=(2.0 * math.cos(angle), 2.0 * math.sin(angle), 0.0)))
+def test_an_error_in_flight_restores_the_terminal_too() -> None:
+    """The message is then read on the usual screen."""
+    screen = Screen()
+    with pytest.raises(ZeroDivisionError), LiveView("hover", "f550", _console(screen, terminal=True)) as view:
+        view.update(status(), CYCLE)
+        raise ZeroDivisionError
+    assert screen.getvalue().rindex(LEAVE) > screen.getvalue().rindex(ENTER)
 
 
-def test_hardly_any_wind_has_no_direction() -> None:
-    """A dot instead of an arrow that spins with the noise."""
-    assert "· 0.01 m/s²" in _drawn(_status(1.0, force=(0.01, 0.0, 0.0)))
-
-
-def test_a_fallback_is_named_beside_the_solver() -> None:
-    """The pilot sees that the solver's answer was replaced, and by what."""
-    assert "fallback: backup" in _drawn(_status(1.0, fallback="backup"))
+def test_a_late_step_does_not_open_the_screen_again() -> None:
+    """The thread that shows the steps may still have one when the flight is over."""
+    screen = Screen()
+    with LiveView("hover", "f550", _console(screen, terminal=True)) as view:
+        pass
+    view.update(status(), CYCLE)
+    assert screen.getvalue() == ""
 
 
 @pytest.mark.parametrize("terminal", [False, True])
 def test_nothing_is_needed_to_be_known(terminal: bool) -> None:
-    """Before the first estimate, and without a solver: phase and progress alone."""
+    """Before the first estimate, and without a solver."""
     screen = Screen()
     with LiveView("hover", "f550", _console(screen, terminal)) as view:
         view.say("connecting")
-        view.update(_status(0.0, estimate=False), None)
+        view.update(unknown(), Cycle(False, 0.0, None))
     assert "connecting" in screen.getvalue()
-    assert "connect" in screen.getvalue().replace("connecting", "")
-    assert "position" not in screen.getvalue()
+    assert ("connect  0 %" in screen.getvalue()) is not terminal
 
 
 def test_a_terminal_is_redrawn_four_times_a_second() -> None:
-    """Not with each of the fifty cycles."""
+    """Not with each of the fifty cycles, and each drawing begins in the corner instead of clearing the screen."""
+    screen, clock = Screen(), Clock()
+    with LiveView("hover", "f550", _console(screen, terminal=True), clock=clock) as view:
+        for k in range(100):
+            clock.now_s = 0.02 * k
+            view.update(status(0.02 * k), CYCLE)
+        assert 7 <= screen.getvalue().count("uasfly · hover") <= 9
+        assert screen.getvalue().count("\x1b[2J") <= 1  # Rich, as it opens the other screen
+
+
+def test_a_slow_terminal_sees_no_old_steps() -> None:
+    """Drawing takes a second: the steps that have waited meanwhile are passed over, and the last of them is drawn."""
+    screen, clock = Screen(), Clock()
+    with LiveView("hover", "f550", _console(screen, terminal=True), clock=clock) as view:
+        view.update(status(0.0), CYCLE)
+        clock.now_s = 1.0
+        for k in range(1, 51):
+            view.update(status(0.02 * k), CYCLE)
+    assert screen.getvalue().count("uasfly · hover") == 2
+
+
+def test_a_terminal_that_cannot_move_its_cursor_gets_plain_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """TERM=dumb."""
+    monkeypatch.setenv("TERM", "dumb")
     screen = Screen()
     with LiveView("hover", "f550", _console(screen, terminal=True)) as view:
-        for k in range(100):
-            view.update(_status(0.02 * k), 1.0)
-    assert 7 <= screen.getvalue().count("legs, leg 2") <= 9
-
-
-def test_names_are_shown_as_they_are() -> None:
-    """A file name is no markup, whatever brackets it has."""
-    screen = Screen()
-    console = _console(screen, terminal=True)
-    console.print(LiveView("my[/bold].yaml", "f550", console).render(_status(1.0), None))
-    assert "my[/bold].yaml" in screen.getvalue()
+        view.update(status(), CYCLE)
+    assert "legs  25 %" in screen.getvalue()
+    assert "\x1b" not in screen.getvalue()
 
 
 def test_a_terminal_that_vanishes_does_not_take_the_result_along() -> None:
     """Leaving the view after the terminal was closed raises nothing."""
     screen = Screen()
     with LiveView("hover", "f550", _console(screen, terminal=True)) as view:
-        view.update(_status(0.0), 1.0)
+        view.update(status(0.0), CYCLE)
         screen.broken = True
     screen.broken = False
 

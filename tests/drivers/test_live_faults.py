@@ -16,7 +16,7 @@ from tests.flight.test_pilot import FakeController, FakeObserver
 from uasfly.control.protocol import ControlResult, ReferenceAt
 from uasfly.drivers.live import fly
 from uasfly.drivers.plan import FlightPlan, load_plan
-from uasfly.drivers.watching import BACKLOG, BackgroundWatch
+from uasfly.drivers.watching import BACKLOG, BackgroundWatch, Cycle
 from uasfly.flight.pilot import Pilot
 from uasfly.flight.sequencer import Engage
 from uasfly.messages import (
@@ -157,7 +157,7 @@ async def test_a_live_view_that_breaks_does_not_end_the_flight() -> None:
     plan, pilot, link = _prepare("")
     link.signals = [signal.SIGHUP]
 
-    def watch(status: Status, solve_ms: float | None) -> None:
+    def watch(status: Status, cycle: Cycle) -> None:
         raise OSError(5, "Input/output error")
 
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
@@ -182,7 +182,7 @@ def test_a_terminal_that_takes_nothing_costs_neither_time_nor_memory() -> None:
     """Steps beyond the backlog are dropped, except those that announce something; closing does not wait for it."""
     stuck, taken = threading.Event(), []
 
-    def watch(status: Status, solve_ms: float | None) -> None:
+    def watch(status: Status, cycle: Cycle) -> None:
         taken.append(status)
         stuck.wait(30.0)
 

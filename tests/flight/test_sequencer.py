@@ -152,6 +152,7 @@ def test_the_pilot_switching_away_has_the_vehicle_at_once() -> None:
     script.run(0.1)
     assert script.sequencer.phase is Phase.ENGAGE
     assert script.sequencer.taken_over
+    assert script.sequencer.pilot_flies
     assert not script.sequencer.in_offboard
     assert any("left offboard for position: the pilot" in text for text in script.texts)
     script.run(30.0)
@@ -170,6 +171,7 @@ def test_the_next_switch_to_offboard_takes_the_mission_up(times: int) -> None:
         script.mode = FlightMode.OFFBOARD
         script.run(1.0)
         assert script.sequencer.phase is Phase.LEGS
+        assert not script.sequencer.pilot_flies
         assert script.sequencer.in_offboard
         assert not script.sequencer.taken_over
     assert script.asked.count(RequestKind.OFFBOARD) == 1
@@ -334,6 +336,7 @@ def test_one_interrupt_holds_and_then_lands() -> None:
     script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
     script.run(0.1)
     assert script.asked[-1] is RequestKind.HOLD
+    assert script.sequencer.reason == "stopped by Ctrl-C"  # known from now on, not only at the end
     script.run(5.0)
     assert script.asked[-1] is RequestKind.LAND
     assert script.sequencer.phase is Phase.ABORTED
@@ -360,6 +363,7 @@ def test_engage_by_pilot_asks_for_nothing_and_waits_for_offboard() -> None:
     script.run(20.0)
     assert script.sequencer.phase is Phase.ENGAGE
     assert script.sequencer.streaming
+    assert script.sequencer.pilot_flies
     script.mode = FlightMode.OFFBOARD
     script.run(0.1)
     assert script.sequencer.phase is Phase.LEGS

@@ -64,17 +64,20 @@ def fly(
     no_log: NoLog = False,
     summary: options.Summary = None,
     as_json: options.Json = False,
+    capture: options.Capture = None,
 ) -> None:
     """Fly a mission over MAVLink.
 
     Example: [bold]uasfly fly my_mission.yaml --connect udpin://0.0.0.0:14540 --airframe my_airframe.yaml[/]
     """
+    from uasfly.cli.capture import Capture
     from uasfly.cli.live_view import LiveView
     from uasfly.cli.output import check_writable, finish
     from uasfly.drivers.flight import Flight, fly_flight
 
     check_writable(log, "flight log")
     check_writable(summary, "summary")
+    check_writable(capture, "picture")
     flight = Flight(
         mission=mission,
         airframe=airframe,
@@ -88,9 +91,13 @@ def fly(
         settings=settings or [],
         log=None if no_log else log or _default_log(mission),
     )
-    with LiveView(mission, airframe) as view:
-        result = fly_flight(flight, view.update, view.say)
-    raise typer.Exit(finish(result, summary, as_json=as_json))
+    picture = Capture(capture) if capture is not None else None
+    with LiveView(mission, airframe, capture=picture) as view:
+        result = fly_flight(flight, view.update, view.say, view.plan)
+    code = finish(result, summary, as_json=as_json)
+    if picture is not None:
+        picture.write()
+    raise typer.Exit(code)
 
 
 def _command_for(mission: str, what: str, example: str) -> Callable[..., None]:

@@ -24,3 +24,7 @@ Settings = Annotated[
 Log = Annotated[Path | None, typer.Option("--log", help="Flight log (MCAP; opens in Foxglove and PlotJuggler).")]
 Summary = Annotated[Path | None, typer.Option("--summary", help="Write the closing summary to this JSON file.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON instead of a table.")]
+Capture = Annotated[
+    Path | None,
+    typer.Option("--capture", help="Write a picture (SVG) of the live view, half way through the legs, to this file."),
+]

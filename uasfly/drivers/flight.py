@@ -43,13 +43,16 @@ class Flight:
     log: Path | None
 
 
-def fly_flight(flight: Flight, watch: Watch, say: Callable[[str], None]) -> dict[str, Any]:
+def fly_flight(
+    flight: Flight, watch: Watch, say: Callable[[str], None], planned: Callable[[FlightPlan], None] | None = None
+) -> dict[str, Any]:
     """Fly and return the summary.
 
     Args:
         flight: what was asked for.
-        watch: called with each step's status and solve time, from a thread of its own.
+        watch: called with each step's status and what the driver knows of the cycle, from a thread of its own.
         say: called with texts that are not part of a step.
+        planned: called once, before anything else, with what is to be flown.
 
     Raises:
         UasflyError: wrong files or flags, a busy port, no vehicle.
@@ -65,6 +68,8 @@ def fly_flight(flight: Flight, watch: Watch, say: Callable[[str], None]) -> dict
         scenario=scenario,
         settings=flight.settings,
     )
+    if planned is not None:
+        planned(plan)
     refuse_infeasible(plan.mission, plan.airframe, say)
     engage = _engage(flight)
     sys.setswitchinterval(SWITCH_INTERVAL_S)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from uasfly.drivers.plan import FlightPlan
-from uasfly.drivers.watching import BackgroundWatch, Watch
+from uasfly.drivers.watching import BackgroundWatch, Cycle, Watch
 from uasfly.errors import describe_error
 from uasfly.flight.pilot import Pilot, StepResult
 from uasfly.flight.summary import SummaryCollector
@@ -39,7 +39,7 @@ async def fly(
         pilot: made for this plan (`build_pilot`).
         link: the connected vehicle.
         log: file for the flight log, None for none.
-        watch: called in a thread of its own with each step's status and the solve time [ms] (None: nothing solved).
+        watch: called in a thread of its own with each step's status and what the driver knows of the cycle.
 
     Raises:
         FileError: when the log cannot be opened.
@@ -106,8 +106,7 @@ class _LiveFlight:
         begun = time.monotonic()
         samples = self._link.poll()
         result = self._pilot.step(begun, samples)
-        if result.setpoint is not None:
-            self._send(result.setpoint)
+        sent = result.setpoint is not None and self._send(result.setpoint)
         for request in result.requests:
             self._link.request(request)
         cycle_ms = (time.monotonic() - begun) * 1e3
@@ -120,14 +119,16 @@ class _LiveFlight:
         self._tell_ground(result.status)
         self._record(result, samples)
         if self._watch is not None:
-            self._watch(result.status, solve_ms)
+            self._watch(result.status, Cycle(sent, cycle_ms, solve_ms))
 
-    def _send(self, setpoint: Setpoint) -> None:
+    def _send(self, setpoint: Setpoint) -> bool:
         """A setpoint that has become old on its way here (the process was stopped) does not leave."""
-        if self._link.send(setpoint):
+        sent = self._link.send(setpoint)
+        if sent:
             self.summary.setpoint_sent(time.monotonic())
         else:
             self._pilot.announce(3, "a setpoint was too old to be sent: this computer or the process was stopped")
+        return sent
 
     def _tell_ground(self, status: Status) -> None:
         """The ground station hears what the pilot at the screen does, but for the small talk."""
@@ -150,7 +151,7 @@ class _LiveFlight:
         if self._writer is not None:
             self._writer.write(status, now)
         if self._watch is not None:
-            self._watch(status, None)
+            self._watch(status, Cycle(False, 0.0, None))
         self.summary.abort(status)
 
     async def _hand_over(self) -> None:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from uasfly.drivers.plan import FlightPlan, build_pilot
+from uasfly.drivers.watching import Cycle, Watch
 from uasfly.flight.sequencer import Engage
 from uasfly.flight.summary import SummaryCollector
 from uasfly.link.in_process import InProcessLink
-from uasfly.messages import Status
 from uasfly.record.writer import LogWriter
 from uasfly.sim.vehicle import SimulatedVehicle
 from uasfly.trajectories.mission_trajectory import LONGEST_S
@@ -21,9 +20,7 @@ from uasfly.trajectories.mission_trajectory import LONGEST_S
 LONGEST_FLIGHT_S = LONGEST_S + 600.0  # the legs, and more than all time-outs of the other phases together
 
 
-def rehearse(
-    plan: FlightPlan, log: Path | None = None, watch: Callable[[Status], None] | None = None
-) -> dict[str, Any]:
+def rehearse(plan: FlightPlan, log: Path | None = None, watch: Watch | None = None) -> dict[str, Any]:
     """Fly a plan and return its summary.
 
     The same plan gives the same log, bit for bit; only the summary's times and real-time factor depend on the machine.
@@ -31,7 +28,7 @@ def rehearse(
     Args:
         plan: what to fly; it must have a scenario and a plant.
         log: file for the flight log, None for none.
-        watch: called with each step's status (progress, live view).
+        watch: called with each step's status and what the driver knows of the cycle (progress, capture).
 
     Raises:
         FileError: when the log cannot be opened.
@@ -67,16 +64,16 @@ def rehearse(
                 summary.setpoint_sent(now_s)
             for request in result.requests:
                 link.request(request)
-            summary.timed(
-                None if result.control is None else result.control.solve_ms, (time.perf_counter() - begun) * 1e3
-            )
+            solve_ms = None if result.control is None else result.control.solve_ms
+            cycle_ms = (time.perf_counter() - begun) * 1e3
+            summary.timed(solve_ms, cycle_ms)
             summary.cycle(result.status, (*samples, truth))
             if writer is not None:
                 for message in (*samples, truth, *result.requests, result.setpoint, result.status):
                     if message is not None:
                         writer.write(message, now_s)
             if watch is not None:
-                watch(result.status)
+                watch(result.status, Cycle(result.setpoint is not None, cycle_ms, solve_ms))
     finally:
         if writer is not None:
             writer.close()

@@ -5,14 +5,31 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from uasfly.errors import describe_error
 from uasfly.messages import Status
 
-Watch = Callable[[Status, float | None], None]
-
 BACKLOG = 200  # steps that wait for a terminal; beyond them only those that announce something are kept
 CLOSE_TIMEOUT_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """What only the driver knows of a cycle.
+
+    Attributes:
+        sent: a setpoint has left.
+        cycle_ms: time of the whole step by the driver's clock.
+        solve_ms: time of the solver in it, None where nothing was solved.
+    """
+
+    sent: bool
+    cycle_ms: float
+    solve_ms: float | None
+
+
+Watch = Callable[[Status, Cycle], None]
 
 
 class BackgroundWatch:
@@ -26,14 +43,14 @@ class BackgroundWatch:
         """Take the callback and start the thread."""
         self.problem = ""
         self._watch = watch
-        self._queue: queue.SimpleQueue[tuple[Status, float | None] | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[tuple[Status, Cycle] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._run, name="live view", daemon=True)
         self._thread.start()
 
-    def __call__(self, status: Status, solve_ms: float | None) -> None:
+    def __call__(self, status: Status, cycle: Cycle) -> None:
         """Hand one step over; returns at once."""
         if status.announcements or self._queue.qsize() < BACKLOG:
-            self._queue.put((status, solve_ms))
+            self._queue.put((status, cycle))
 
     def close(self) -> None:
         """Show what is left; a terminal that takes nothing is not waited for longer than a second."""

@@ -298,4 +298,5 @@ class Pilot:
             alarms=alarms,
             action=self._response.action,
             pace=course.pace(time_s) if in_legs else 0.0,
+            pilot_flies=sequencer.pilot_flies,
         )

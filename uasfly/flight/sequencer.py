@@ -66,7 +66,7 @@ class Sequencer:
         takeoff_height_m: height above ground of the take-off.
         ending: what follows the legs.
         telemetry: what counts as silence.
-        phase, reason: where the flight is, and why it ended early.
+        phase, reason: where the flight is, and why it ends or has ended early.
         streaming: whether setpoints are to be sent in this step.
         hand_over: uasfly leaves a vehicle that it was flying: the driver's last request must be hold.
         taken_over: somebody else has taken the vehicle out of the legs; the mission waits.
@@ -158,7 +158,7 @@ class Sequencer:
         if not self._flies:
             self._abort(time_s, reason)
             return
-        self._abort_reason = self._abort_reason or reason
+        self.reason = self._abort_reason = self._abort_reason or reason
         self.ending = ending or self.ending
         self.announcements.append((4, f"{reason}: holding, then {self.ending.value}"))
         self._enter(time_s, Phase.ENDING)
@@ -175,6 +175,11 @@ class Sequencer:
     def in_offboard(self) -> bool:
         """Whether uasfly's setpoints are what flies the vehicle."""
         return self._offboard_since_s is not None
+
+    @property
+    def pilot_flies(self) -> bool:
+        """Whether the mission waits for the pilot, who has the vehicle, to switch to offboard."""
+        return self.phase is Phase.ENGAGE and (self.taken_over or self.engage is Engage.PILOT)
 
     @property
     def _flies(self) -> bool:
