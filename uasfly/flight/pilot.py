@@ -174,7 +174,7 @@ class Pilot:
             preflight.look(time_s, samples, self.view)
         if not sequencer.clearance.awaited or not (self.done or preflight.has_facts(time_s)):
             return ()
-        diagnosis = self._diagnosis(time_s) if self.observer.moment is not None else None
+        diagnosis = None if estimate is None else self._diagnosis(time_s)
         origin = None if estimate is None else self._origin_of(estimate)
         checks = preflight.judge(self.view, estimate, diagnosis, origin)
         if self.view.in_air and sequencer.engage is Engage.PILOT and not sequencer.clearance.only_check:
