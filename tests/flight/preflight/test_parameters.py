@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from tests.data import test_data
 from tests.flight.preflight.gathering import (
     AIRFRAME,
     OK,
@@ -21,6 +22,7 @@ from tests.flight.preflight.gathering import (
 )
 from uasfly.flight.preflight import PARAMETERS, judge
 from uasfly.flight.sequencer import Engage
+from uasfly.link.parameters import parameter_value
 from uasfly.messages import Verdict
 from uasfly.sim.parameters import ParameterTable
 
@@ -143,3 +145,28 @@ def test_the_simulated_vehicle_has_every_parameter() -> None:
     """Names of the list are PX4's, and types those of the recording."""
     table = ParameterTable()
     assert set(PARAMETERS) <= set(table)
+
+
+def test_what_px4_answered_in_the_recording_is_judged_as_it_should_be() -> None:
+    """From the bytes of its PARAM_VALUE to the lines: its simulator has no remote control and returns when it can."""
+    mavutil = pytest.importorskip("pymavlink.mavutil")
+    path = str(test_data("px4_recordings/conformance.tlog"))
+    log = mavutil.mavlink_connection(path, dialect="development")
+    recorded: dict[str, float] = {}
+    while (message := log.recv_match(type="PARAM_VALUE")) is not None:
+        value = parameter_value(message.to_dict())
+        if value is not None:
+            recorded[message.param_id] = value
+    told = facts(parameters=dict.fromkeys(PARAMETERS, math.nan) | recorded)
+    lines = {line.name: line for line in judge(gathered(facts=told)) if line.name in recorded}
+    assert {name: line.verdict for name, line in lines.items()} == {
+        "COM_OF_LOSS_T": OK,
+        "COM_OBL_RC_ACT": OK,
+        "COM_RC_IN_MODE": WARNING,
+        "COM_RCL_EXCEPT": WARNING,
+        "NAV_RCL_ACT": WARNING,
+        "NAV_DLL_ACT": OK,
+        "COM_LOW_BAT_ACT": WARNING,
+        "MPC_THR_HOVER": STOP,  # the quadrotor of the recording hovers at 0.49, the airframe file's at 0.34
+    }
+    assert lines["MPC_THR_HOVER"].value.startswith("0.500, the airframe file hovers at 0.344")

@@ -7,13 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from uasfly.control.delay import LONGEST_PREDICTION_S
 from uasfly.flight.preflight.gathered import Gathered, Subject
 from uasfly.messages import PreflightCheck
 
 LEAST_IN_TIME = 2.0  # samples within the time after which telemetry counts as silent: one may be lost
 TARGET_LEAST_HZ = 5.0  # the echo until offboard wants a target younger than half a second
-SLOW_ROUND_TRIP_S = 0.05  # a period of the slowest loop that is fed back over the link, PX4's attitude setpoints
+SLOW_ROUND_TRIP_S = 0.05  # as long as the whole delay of command_delay_s in the shipped airframe files
 
 _ODOMETRY = Subject(
     "odometry rate", "the observer corrects itself with each ODOMETRY; a silent one stops the setpoints"
@@ -65,7 +64,7 @@ def _age(gathered: Gathered) -> PreflightCheck:
     value = f"{median * 1e3:.0f} ms, 95 % within {late * 1e3:.0f} ms"
     stale_s = gathered.mission.monitors.telemetry.stale_s
     remedy = "use a faster link, or a computer with less to do"
-    if late > min(stale_s, LONGEST_PREDICTION_S):
+    if late > stale_s:
         return _AGE.stop(value, remedy)
     return _AGE.warning(value, remedy) if late > 0.5 * stale_s else _AGE.ok(value)
 

@@ -27,8 +27,9 @@ PARAMETERS = (
     "RTL_RETURN_ALT",
 )
 
-LOSS_SHORTEST_S, LOSS_LONG_S, LOSS_LONGEST_S = 0.3, 2.0, 5.0
-HOVER_WARNING, HOVER_STOP = 0.1, 0.3
+LOSS_SHORTEST_S = 0.3  # setpoints may pause for 0.2 s before uasfly itself calls it a silence
+LOSS_LONG_S, LOSS_LONGEST_S = 2.0, 5.0  # a tilt of 5 deg makes 2 m/s of it in the former, 4 m/s in the latter
+HOVER_WARNING, HOVER_STOP = 0.1, 0.3  # 1 and 3 m/s^2 up or down in the first moment of offboard
 TAKEOFF_TAKES_S = 5.0  # 1 s of spooling up (COM_SPOOLUP_TIME), 3 s of ramp (MPC_TKO_RAMP_T), and the request
 OFFBOARD = 4  # bit of COM_RCL_EXCEPT and COM_DLL_EXCEPT
 
@@ -91,7 +92,7 @@ def _loss_time(gathered: Gathered) -> PreflightCheck:
     if seconds is None:
         return _unknown(_LOSS_TIME)
     value, remedy = f"{seconds:g} s", "set it to 1 s"
-    if seconds > LOSS_LONGEST_S:  # a tilt of 5 deg makes 4 m/s of it by then
+    if seconds > LOSS_LONGEST_S:
         return _LOSS_TIME.stop(value, remedy)
     if seconds > LOSS_LONG_S:
         return _LOSS_TIME.warning(value, remedy)
@@ -197,7 +198,7 @@ def _hover(gathered: Gathered) -> PreflightCheck:
     off = told / expected - 1.0
     value = f"{told:.3f}, the airframe file hovers at {expected:.3f} ({off * 100.0:+.0f} %)"
     remedy = f"fly the airframe file of this vehicle; where it is, set MPC_THR_HOVER to {expected:.2f}"
-    if abs(off) > HOVER_STOP:  # 3 m/s^2 up or down in the first moment of offboard
+    if abs(off) > HOVER_STOP:
         return _HOVER.stop(value, remedy)
     return _HOVER.warning(value, remedy) if abs(off) > HOVER_WARNING else _HOVER.ok(value)
 
