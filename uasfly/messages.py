@@ -134,6 +134,37 @@ class LinkSample:
 
 
 @dataclass(frozen=True, slots=True)
+class NamedValue:
+    """A number with a name; NaN where it is not known."""
+
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class FactsSample:
+    """What a driver has found out before a flight and telemetry does not tell, see `uasfly.flight.preflight`.
+
+    Attributes:
+        time_s: when it was complete.
+        parameters: PX4's, NaN for one that was not told.
+        home: (3,) m, world; None where there is none, or it was not told.
+        rates_hz: at which messages arrive, by name.
+        losses: number of messages lost, by cause.
+        round_trip_s: smallest recent TIMESYNC round trip; NaN where TIMESYNC is not answered.
+        solve_ms: times of warm solver steps on this computer; empty where the controller has no solver.
+    """
+
+    time_s: float
+    parameters: tuple[NamedValue, ...]
+    home: Array | None
+    rates_hz: tuple[NamedValue, ...]
+    losses: tuple[NamedValue, ...]
+    round_trip_s: float
+    solve_ms: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class TruthSample:
     """True state where a simulation gives it; only the summary and the log look at it.
 
@@ -190,6 +221,7 @@ Sample = (
     | HealthSample
     | TextSample
     | LinkSample
+    | FactsSample
     | TruthSample
     | RequestResult
 )
@@ -298,6 +330,33 @@ class Alarm:
     action: Action
     severity: int
     text: str
+
+
+class Verdict(enum.Enum):
+    """What a preflight check says."""
+
+    OK = "ok"
+    WARNING = "warning"  # the flight goes on, the pilot should know
+    STOP = "stop"  # nothing is armed
+
+
+@dataclass(frozen=True, slots=True)
+class PreflightCheck:
+    """One line of the preflight check.
+
+    Attributes:
+        name: what was looked at; a parameter of PX4 by its own name.
+        verdict: what that means for the flight.
+        value: what was found, with its unit.
+        why: why it matters.
+        remedy: what to do about it, "" where all is well.
+    """
+
+    name: str
+    verdict: Verdict
+    value: str
+    why: str
+    remedy: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-COMMANDS = ("hover", "back-and-forth", "spiral", "fly", "rehearse", "sim", "check", "schema")
+COMMANDS = ("hover", "back-and-forth", "spiral", "fly", "preflight", "rehearse", "sim", "check", "schema")
 
 
 def _run(*arguments: str, timeout_s: float = 120.0) -> subprocess.CompletedProcess[str]:
@@ -40,6 +40,9 @@ def test_every_command_explains_itself_with_an_example(command: str) -> None:
         (("rehearse", "hover", "--summary", "missing/s.json"), "folder for the summary does not exist"),
         (("rehearse", "hover", "--capture", "missing/v.svg"), "folder for the picture does not exist"),
         (("hover", "--scenario", "gusty"), "add --sim"),
+        (("preflight", "nowhere", "--sim"), "there is no mission of this name"),
+        (("preflight", "hover", "--scenario", "gusty"), "add --sim"),
+        (("preflight", "hover", "--connect", "carrier-pigeon://coop"), "accepted forms"),
         (("hover", "--sim", "--engage", "robot"), "expected auto or pilot"),
         (("hover", "--connect", "carrier-pigeon://coop"), "accepted forms"),
         (("check", "no_such_file.yaml"), "no such file"),

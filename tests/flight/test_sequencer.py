@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from uasfly.flight.clearance import Clearance
 from uasfly.flight.sequencer import EndingAction, Engage, Sequencer
 from uasfly.flight.view import VehicleView
 from uasfly.messages import (
@@ -98,6 +99,88 @@ class Script:
 
 def _script(engage: Engage = Engage.AUTO, ending: EndingAction = EndingAction.LAND) -> Script:
     return Script(Sequencer(engage, 1.5, ending))
+
+
+def _checked(engage: Engage = Engage.AUTO, *, only_check: bool = False) -> Script:
+    """A flight that has to be cleared."""
+    clearance = Clearance(needed=True, only_check=only_check)
+    return Script(Sequencer(engage, 1.5, EndingAction.LAND, clearance=clearance))
+
+
+def test_nothing_is_armed_before_the_preflight_check_has_cleared_it() -> None:
+    """It is awaited when all else is ready, not before; once cleared the flight goes on."""
+    script = _checked()
+    script.run(0.9)
+    assert not script.sequencer.clearance.awaited
+    script.run(20.0)
+    assert script.sequencer.clearance.awaited
+    assert (script.sequencer.phase, script.asked) == (Phase.PREFLIGHT, [])
+    script.sequencer.clear(script.time_s, "")
+    script.run(PERIOD_S)
+    assert (script.sequencer.phase, script.asked) == (Phase.TAKEOFF, [RequestKind.ARM])
+    assert not script.sequencer.clearance.awaited
+
+
+def test_a_preflight_check_that_says_stop_arms_nothing() -> None:
+    """The flight is over, and the reason is the check's."""
+    script = _checked()
+    script.run(2.0)
+    script.sequencer.clear(script.time_s, "no battery")
+    script.run(5.0)
+    assert (script.sequencer.phase, script.sequencer.reason, script.asked) == (Phase.ABORTED, "no battery", [])
+    assert not script.sequencer.hand_over
+
+
+def test_a_mere_check_ends_when_it_is_cleared() -> None:
+    """Nothing is armed after it either."""
+    script = _checked(only_check=True)
+    script.run(2.0)
+    script.sequencer.clear(script.time_s, "")
+    script.run(5.0)
+    assert (script.sequencer.phase, script.sequencer.reason, script.asked) == (Phase.DONE, "", [])
+
+
+def test_a_vehicle_that_becomes_unready_is_not_judged_meanwhile() -> None:
+    """The check waits until it is ready again."""
+    script = _checked()
+    script.run(2.0)
+    script.sigma_m = 9.0
+    script.run(PERIOD_S)
+    assert not script.sequencer.clearance.awaited
+    script.sigma_m = 0.01
+    script.run(1.5)
+    assert script.sequencer.clearance.awaited
+
+
+def test_a_vehicle_that_does_not_get_ready_is_judged_at_the_end() -> None:
+    """The check tells what else is wrong; it changes nothing any more."""
+    script = _checked()
+    script.sigma_m = 9.0
+    script.run(31.0)
+    assert script.sequencer.phase is Phase.ABORTED
+    assert script.sequencer.clearance.awaited
+    reason = script.sequencer.reason
+    script.sequencer.clear(script.time_s, "much")
+    assert (script.sequencer.phase, script.sequencer.reason) == (Phase.ABORTED, reason)
+    assert not script.sequencer.clearance.awaited
+    interrupted = _checked()
+    interrupted.run(0.5)
+    interrupted.sequencer.interrupt(interrupted.time_s, "Ctrl-C")
+    assert not interrupted.sequencer.clearance.awaited
+
+
+def test_every_take_off_of_the_pilot_is_cleared_anew() -> None:
+    """After a landing the battery is another one."""
+    script = _checked(Engage.PILOT)
+    script.armed = script.in_air = True
+    script.run(2.0)
+    script.sequencer.clear(script.time_s, "")
+    script.run(PERIOD_S)
+    assert script.sequencer.phase is Phase.ENGAGE
+    script.armed = script.in_air = False
+    script.run(2.0)
+    assert script.sequencer.phase is Phase.PREFLIGHT
+    assert script.sequencer.clearance.awaited
 
 
 def _in_legs(ending: EndingAction = EndingAction.LAND) -> Script:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import select
+import struct
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -22,6 +23,7 @@ CUSTOM_HOLD = 4 << 16 | 3 << 24
 PX4, ARDUPILOT = 12, 3
 QUADROTOR, GROUND_STATION = 2, 6
 COMMAND_SET_INTERVAL = 511
+COMMAND_REQUEST_MESSAGE, HOME_POSITION = 512, 242
 
 
 class FakeVehicle(threading.Thread):
@@ -35,7 +37,8 @@ class FakeVehicle(threading.Thread):
     Attributes:
         received: every message that came, in order.
         answers: MAV_RESULT by command; None swallows the command; a function is called with the message.
-        parameters: values by name; `frozen_parameters` keep theirs.
+        parameters: values by name, whole numbers are 32-bit integers; `frozen_parameters` keep theirs.
+        home_ned: answer to a request for HOME_POSITION; None keeps silent.
         rates_hz: streams; SET_MESSAGE_INTERVAL changes them.
         silent: it neither sends nor answers.
     """
@@ -52,7 +55,8 @@ class FakeVehicle(threading.Thread):
         super().__init__(daemon=True)
         self.received: list[Any] = []
         self.answers: dict[int, int | Callable[[Any], None] | None] = {}
-        self.parameters = {"MIS_TAKEOFF_ALT": 2.5}
+        self.parameters: dict[str, float | int] = {"MIS_TAKEOFF_ALT": 2.5}
+        self.home_ned: tuple[float, float, float] | None = None
         self.frozen_parameters: set[str] = set()
         self.rates_hz = {"HEARTBEAT": 10.0, "ODOMETRY": 30.0, "ATTITUDE_TARGET": 10.0, "ESTIMATOR_STATUS": 1.0}
         self.clock_ahead_s = clock_ahead_s
@@ -160,6 +164,8 @@ class FakeVehicle(threading.Thread):
                 known = mavlink.mavlink_map.get(int(message.param1))
                 self.rates_hz[known.msgname if known else str(message.param1)] = 1e6 / message.param2
             self.acknowledge(message, answer)
+            if (message.command, message.param1) == (COMMAND_REQUEST_MESSAGE, HOME_POSITION) and self.home_ned:
+                self.send(mavlink.MAVLink_home_position_message(0, 0, 0, *self.home_ned, [1.0, 0.0, 0.0, 0.0], 0, 0, 0))
 
     def acknowledge(self, message: Any, result: int) -> None:
         """Answer a command."""
@@ -175,12 +181,25 @@ class FakeVehicle(threading.Thread):
         if name in self.parameters:
             if name not in self.frozen_parameters:
                 self.parameters[name] = message.param_value
-            self.send(mavlink.MAVLink_param_value_message(name.encode(), self.parameters[name], 9, 1, 0))
+            self._tell_parameter(name)
+
+    def _parameter_read(self, message: Any) -> None:
+        if message.param_id in self.parameters:
+            self._tell_parameter(message.param_id)
+
+    def _tell_parameter(self, name: str) -> None:
+        value = self.parameters[name]
+        if isinstance(value, int):  # as PX4: its bytes in the place of the float
+            content, kind = struct.unpack("<f", struct.pack("<i", value))[0], 6
+        else:
+            content, kind = value, 9
+        self.send(mavlink.MAVLink_param_value_message(name.encode(), content, kind, 1, 0))
 
     _handlers: Mapping[str, Callable[[FakeVehicle, Any], None]] = {
         "COMMAND_LONG": _command,
         "TIMESYNC": _time_request,
         "PARAM_SET": _parameter,
+        "PARAM_REQUEST_READ": _parameter_read,
     }
 
 

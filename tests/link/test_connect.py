@@ -12,10 +12,12 @@ from pathlib import Path
 import pytest
 
 from tests.link.fake_vehicle import ARDUPILOT, GROUND_STATION, FakeVehicle
-from tests.link.waiting import arrived, texts, until
+from tests.link.waiting import PATIENCE_S, arrived, texts, until
 from tests.link.wires import SerialWire, TcpClientWire, TcpWire, UdpWire, free_udp_port
 from uasfly.errors import LinkError
 from uasfly.link import upkeep
+from uasfly.link.bridge import HeardSystem
+from uasfly.link.finding import refuse_several
 from uasfly.link.mavsdk_link import MavsdkLink
 from uasfly.link.ports import check_available
 from uasfly.link.urls import parse_url
@@ -84,6 +86,47 @@ async def test_the_wanted_one_of_two_vehicles_is_taken() -> None:
             samples = await until(link, lambda got: sum(isinstance(s, OdometrySample) for s in got) > 10)
             heights = {s.position_in_world[2] for s in samples if isinstance(s, OdometrySample)}
             assert heights == {2.0}
+
+
+async def test_two_vehicles_without_a_system_id_are_refused_and_listed() -> None:
+    """Which of them is flown must not be up to whose heartbeat comes first."""
+    port = free_udp_port()
+    with FakeVehicle(UdpWire(port), system_id=3), FakeVehicle(UdpWire(port), system_id=4):
+        with pytest.raises(LinkError, match=r"expected one vehicle, heard 2: 3 \(PX4\), 4 \(PX4\).*--system-id"):
+            await MavsdkLink.connect(f"udpin://127.0.0.1:{port}", listen_s=PATIENCE_S)
+        check_available(parse_url(f"udpin://127.0.0.1:{port}"))
+
+
+async def test_a_second_vehicle_that_is_heard_late_is_refused_too() -> None:
+    """The link listens for as long as it was told to; nothing of it is left behind."""
+    port = free_udp_port()
+    with FakeVehicle(UdpWire(port)), FakeVehicle(UdpWire(port), system_id=9) as late:
+        late.silent = True
+        url = f"udpin://127.0.0.1:{port}"
+        connecting = asyncio.create_task(MavsdkLink.connect(url, listen_s=4.0))
+        await asyncio.sleep(1.5)
+        late.silent = False
+        with pytest.raises(LinkError, match=r"1 \(PX4\), 9 \(PX4\)"):
+            await connecting
+        check_available(parse_url(url))
+
+
+async def test_a_ground_station_beside_the_vehicle_is_no_second_vehicle() -> None:
+    """Only autopilots count."""
+    port = free_udp_port()
+    with FakeVehicle(UdpWire(port)), FakeVehicle(UdpWire(port), 255, INVALID_AUTOPILOT, GROUND_STATION, 0.0, 190):
+        async with await MavsdkLink.connect(f"udpin://127.0.0.1:{port}", listen_s=2.0) as link:
+            assert link.system_id == 1
+
+
+def test_vehicles_are_told_apart_from_everything_else() -> None:
+    """Nobody, one vehicle, or one with a ground station: nothing to choose; two: both are named."""
+    url = parse_url("udpin://0.0.0.0:14540")
+    one, two, station = HeardSystem(1, "PX4"), HeardSystem(2, "ARDUPILOT"), HeardSystem(255, None)
+    for heard in ([], [one], [one, station]):
+        refuse_several(url, heard)
+    with pytest.raises(LinkError, match=r"heard 2: 1 \(PX4\), 2 \(ARDUPILOT\)"):
+        refuse_several(url, [one, station, two])
 
 
 async def test_udpout_and_tcpout_reach_a_vehicle_that_listens() -> None:

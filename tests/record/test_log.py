@@ -16,15 +16,19 @@ import pytest
 
 from uasfly.errors import FileError
 from uasfly.messages import (
+    FactsSample,
     FlightMode,
+    NamedValue,
     OdometrySample,
     Phase,
+    PreflightCheck,
     Request,
     RequestKind,
     RequestResult,
     StateEstimate,
     Status,
     VehicleSample,
+    Verdict,
 )
 from uasfly.record.encode import from_json, json_schema, to_json
 from uasfly.record.reader import LogReader
@@ -62,6 +66,11 @@ def _equal(a: object, b: object) -> bool:
         _status(),
         VehicleSample(1.0, FlightMode.OFFBOARD, armed=True, in_air=False),
         RequestResult(2.0, Request(RequestKind.TAKEOFF, 1.5), accepted=False, text="preflight"),
+        FactsSample(
+            3.0, (NamedValue("COM_OF_LOSS_T", 1.0), NamedValue("X", math.nan)), np.ones(3), (), (), 0.3e-3, (0.1, 0.2)
+        ),
+        FactsSample(3.0, (), None, (NamedValue("ODOMETRY", 99.5),), (NamedValue("late", 2.0),), math.nan, ()),
+        PreflightCheck("home", Verdict.WARNING, "none", "PX4 returns there", "wait"),
     ],
     ids=lambda message: type(message).__name__,
 )

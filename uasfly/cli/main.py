@@ -7,7 +7,7 @@ import sys
 import typer
 
 from uasfly import __version__
-from uasfly.cli import check, faults, fly, rehearse, sim
+from uasfly.cli import check, faults, fly, preflight, rehearse, sim
 
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
@@ -36,6 +36,7 @@ def _root(
 
 
 fly.register(app)
+preflight.register(app)
 rehearse.register(app)
 check.register(app)
 sim.register(app)

@@ -10,6 +10,9 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
+
+_VERDICT_STYLES = {"ok": "green", "warning": "yellow", "stop": "bold red"}
 
 
 def check_writable(path: Path | None, what: str) -> None:
@@ -45,8 +48,26 @@ def finish(summary: dict[str, Any], path: Path | None, *, as_json: bool) -> int:
         if as_json:
             print(json.dumps(summary, indent=2))
         else:
+            if any(check["verdict"] == "stop" for check in summary["preflight"]):
+                Console().print(preflight_table(summary["preflight"]))
             Console().print(summary_table(summary))
     return 0 if summary["outcome"] == "completed" else 1
+
+
+def preflight_table(checks: list[dict[str, str]]) -> Table:
+    """The lines of a preflight check: verdict, value, why it matters, what to do."""
+    table = Table(title="Preflight")
+    table.add_column("")
+    table.add_column("check", no_wrap=True)
+    table.add_column("value", ratio=2)
+    table.add_column("why it matters → what to do", ratio=3)
+    for check in checks:
+        style = _VERDICT_STYLES[check["verdict"]]
+        why = Text(check["why"])
+        if check["remedy"]:
+            why.append(f"\n→ {check['remedy']}", style=style)
+        table.add_row(Text(check["verdict"], style=style), Text(check["name"]), Text(check["value"]), why)
+    return table
 
 
 def summary_table(summary: dict[str, Any]) -> Table:

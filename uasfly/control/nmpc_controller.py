@@ -21,6 +21,7 @@ from uasfly.frames import wrap_angle
 from uasfly.messages import Array, ReferenceHorizon, Setpoint, StateEstimate
 from uasfly.model import controller_parameters
 
+DEADLINE_SHARE = 0.8  # of a control period: a solve that takes longer is late
 LONGEST_PLAN_AGE_S = 0.5  # the plan flies open loop for so long, then the backup PIDs take over
 
 _REASONS = {
@@ -54,7 +55,7 @@ class NmpcController:
     ) -> None:
         self._airframe = airframe
         self._timer = timer
-        self._deadline_s = 0.8 / airframe.controller.rate_hz if deadline_s is None else deadline_s
+        self._deadline_s = DEADLINE_SHARE / airframe.controller.rate_hz if deadline_s is None else deadline_s
         self.solver = RealTimeIteration(problem_from_airframe(airframe), backend)
         self._times = self.solver.problem.grid.time_s
         self._delay = DelayPredictor(airframe.model)

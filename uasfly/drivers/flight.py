@@ -9,13 +9,15 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from uasfly.drivers.checking import refuse_infeasible
 from uasfly.drivers.live import fly
 from uasfly.drivers.plan import FlightPlan, build_pilot, load_plan
+from uasfly.drivers.preflight import gather_facts, time_solver
 from uasfly.drivers.watching import Watch
 from uasfly.errors import UasflyError
 from uasfly.flight.pilot import Pilot
@@ -23,12 +25,14 @@ from uasfly.flight.sequencer import Engage
 from uasfly.link.mavsdk_link import MavsdkLink
 
 CONNECT_TIMEOUT_S = 10.0
+LISTEN_S = 2.5  # for a second vehicle: two heartbeats and a half
+SIMULATED_ID = 1
 SWITCH_INTERVAL_S = 0.0005  # another thread at work delays a cycle by at most about this
 
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """What the command line was asked for."""
+    """What the command line was asked for; `only_check` ends it after the preflight check."""
 
     mission: str
     airframe: str
@@ -39,8 +43,21 @@ class Flight:
     controller: str
     engage: str | None
     system_id: int | None
-    settings: list[str]
+    settings: list[str] = field(default_factory=list)
+    log: Path | None = None
+    only_check: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Prepared:
+    """What is ready before anybody is kept waiting."""
+
+    plan: FlightPlan
+    pilot: Pilot
+    solve_ms: tuple[float, ...]
     log: Path | None
+    watch: Watch
+    say: Callable[[str], None]
 
 
 def fly_flight(
@@ -55,7 +72,7 @@ def fly_flight(
         planned: called once, before anything else, with what is to be flown.
 
     Raises:
-        UasflyError: wrong files or flags, a busy port, no vehicle.
+        UasflyError: wrong files or flags, a busy port, no vehicle, several vehicles and no system id.
     """
     if flight.scenario is not None and not flight.sim:
         raise UasflyError("--scenario belongs to the built-in simulation: add --sim, or leave it out on a real vehicle")
@@ -74,44 +91,43 @@ def fly_flight(
     engage = _engage(flight)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     with _ended_in_order():
-        pilot = build_pilot(plan, engage, time.perf_counter, late_counts=True)  # before anybody is kept waiting
+        pilot = build_pilot(
+            plan, engage, time.perf_counter, late_counts=True, preflight=True, only_check=flight.only_check
+        )
+        prepared = _Prepared(plan, pilot, time_solver(plan), flight.log, watch, say)
         if not flight.sim:
-            return asyncio.run(_connect_and_fly(plan, pilot, flight.url, flight.system_id, flight.log, watch, say))
-        return _fly_simulated(plan, pilot, flight.log, watch, say)
+            return asyncio.run(_connect_and_fly(prepared, flight.url, flight.system_id))
+        return _fly_simulated(prepared)
 
 
-def _fly_simulated(
-    plan: FlightPlan, pilot: Pilot, log: Path | None, watch: Watch, say: Callable[[str], None]
-) -> dict[str, Any]:
+def _fly_simulated(prepared: _Prepared) -> dict[str, Any]:
     from uasfly.sim.mavlink.process import start_process
 
+    plan = prepared.plan
     assert plan.scenario is not None
     assert plan.plant is not None
     port = _free_port()
-    say(f"simulated {plan.airframe.name} in {plan.scenario.name}, seed {plan.seed}")
+    prepared.say(f"simulated {plan.airframe.name} in {plan.scenario.name}, seed {plan.seed}")
     with start_process(plan.plant, plan.scenario, plan.seed, remote_port=port, local_port=0) as vehicle:
-        url = f"udpin://127.0.0.1:{port}"
-        summary = asyncio.run(_connect_and_fly(plan, pilot, url, None, log, watch, say))
+        summary = asyncio.run(_connect_and_fly(prepared, f"udpin://127.0.0.1:{port}", SIMULATED_ID))
         if not vehicle.alive:
             summary["warnings"].append("the simulated vehicle ended by itself")
         summary["warnings"] += vehicle.complaints().splitlines()
     return summary
 
 
-async def _connect_and_fly(
-    plan: FlightPlan,
-    pilot: Pilot,
-    url: str,
-    system_id: int | None,
-    log: Path | None,
-    watch: Watch,
-    say: Callable[[str], None],
-) -> dict[str, Any]:
-    say(f"connecting to {url}")
-    want_truth = plan.scenario is not None
-    link = await MavsdkLink.connect(url, system_id=system_id, timeout_s=CONNECT_TIMEOUT_S, want_truth=want_truth)
+async def _connect_and_fly(prepared: _Prepared, url: str, system_id: int | None) -> dict[str, Any]:
+    prepared.say(f"connecting to {url}")
+    link = await MavsdkLink.connect(
+        url,
+        system_id=system_id,
+        timeout_s=CONNECT_TIMEOUT_S,
+        want_truth=prepared.plan.scenario is not None,
+        listen_s=LISTEN_S,
+    )
     try:
-        return await fly(plan, pilot, link, log, watch)
+        gather = partial(gather_facts, link, prepared.solve_ms)
+        return await fly(prepared.plan, prepared.pilot, link, prepared.log, prepared.watch, gather)
     finally:
         await link.close()
 

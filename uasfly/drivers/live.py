@@ -7,7 +7,7 @@ import contextlib
 import gc
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from uasfly.errors import describe_error
 from uasfly.flight.pilot import Pilot, StepResult
 from uasfly.flight.summary import SummaryCollector
 from uasfly.link.protocol import VehicleLink
-from uasfly.messages import Phase, Request, RequestKind, RequestResult, Sample, Setpoint, Status
+from uasfly.messages import FactsSample, Phase, Request, RequestKind, RequestResult, Sample, Setpoint, Status
 from uasfly.record.writer import BackgroundLogWriter
 
 HAND_OVER_S = 2.5  # time for the last request to be repeated and answered
@@ -26,7 +26,12 @@ TOLD_SEVERITY = 5  # and worse: notice, warning, error ...
 
 
 async def fly(
-    plan: FlightPlan, pilot: Pilot, link: VehicleLink, log: Path | None = None, watch: Watch | None = None
+    plan: FlightPlan,
+    pilot: Pilot,
+    link: VehicleLink,
+    log: Path | None = None,
+    watch: Watch | None = None,
+    gather: Callable[[], Coroutine[Any, Any, FactsSample]] | None = None,
 ) -> dict[str, Any]:
     """Fly a plan over an open link and return its summary; the link is left open for its owner.
 
@@ -40,19 +45,23 @@ async def fly(
         link: the connected vehicle.
         log: file for the flight log, None for none.
         watch: called in a thread of its own with each step's status and what the driver knows of the cycle.
+        gather: finds out what the preflight check wants to know, beside the cycles.
 
     Raises:
         FileError: when the log cannot be opened.
     """
     writer = BackgroundLogWriter(log, plan.description()) if log is not None else None
     flight = _LiveFlight(pilot, link, writer, BackgroundWatch(watch) if watch is not None else None)
+    facts = None if gather is None else asyncio.create_task(gather())
     started = time.monotonic()
     gc.collect()
     gc.freeze()  # what lives now lives to the end: no need to look through it in flight
     with _signals(pilot):
         try:
-            await flight.run(1.0 / plan.airframe.controller.rate_hz)
+            await flight.run(1.0 / plan.airframe.controller.rate_hz, facts)
         finally:
+            if facts is not None:
+                facts.cancel()
             gc.unfreeze()
             flight.close()
     wall_s = time.monotonic() - started
@@ -71,9 +80,11 @@ class _LiveFlight:
         self._writer = writer
         self._watch = watch
         self._log_lost = False
+        self._facts: asyncio.Task[FactsSample] | None = None
 
-    async def run(self, period_s: float) -> None:
+    async def run(self, period_s: float, facts: asyncio.Task[FactsSample] | None) -> None:
         """Cycle until the flight has ended, and leave a vehicle that still flies in hold."""
+        self._facts = facts
         try:
             await self._cycles(period_s)
         except Exception as error:
@@ -104,7 +115,7 @@ class _LiveFlight:
 
     def _cycle(self) -> None:
         begun = time.monotonic()
-        samples = self._link.poll()
+        samples = self._link.poll() + self._gathered()
         result = self._pilot.step(begun, samples)
         sent = result.setpoint is not None and self._send(result.setpoint)
         for request in result.requests:
@@ -116,10 +127,23 @@ class _LiveFlight:
         solve_ms = None if result.control is None else result.control.solve_ms
         self.summary.timed(solve_ms, cycle_ms)
         self.summary.cycle(result.status, samples)
+        self.summary.preflight(result.preflight)
         self._tell_ground(result.status)
         self._record(result, samples)
         if self._watch is not None:
             self._watch(result.status, Cycle(sent, cycle_ms, solve_ms))
+
+    def _gathered(self) -> tuple[FactsSample, ...]:
+        """What the preflight check wants to know, once; after an error it judges without."""
+        task = self._facts
+        if task is None or not task.done():
+            return ()
+        self._facts = None
+        error = task.exception()
+        if error is None:
+            return (task.result(),)
+        self._pilot.announce(4, f"the preflight check knows less: {describe_error(error)}")
+        return ()
 
     def _send(self, setpoint: Setpoint) -> bool:
         """A setpoint that has become old on its way here (the process was stopped) does not leave."""
@@ -138,7 +162,7 @@ class _LiveFlight:
 
     def _record(self, result: StepResult, samples: tuple[Sample, ...]) -> None:
         if self._writer is not None:
-            for message in (*samples, *result.requests, result.setpoint, result.status):
+            for message in (*samples, *result.requests, result.setpoint, *result.preflight, result.status):
                 if message is not None:
                     self._writer.write(message, result.status.time_s)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from uasfly.airframe import Airframe
+from uasfly.control.protocol import Controller
 from uasfly.errors import UasflyError
 from uasfly.files import find_file, load_file, parse_overrides
 from uasfly.flight.pilot import Pilot
@@ -89,7 +90,15 @@ def load_plan(
     return FlightPlan(airframe_model, mission_model, controller, seed, scenario_model, plant)
 
 
-def build_pilot(plan: FlightPlan, engage: Engage, timer: Callable[[], float] | None, *, late_counts: bool) -> Pilot:
+def build_pilot(
+    plan: FlightPlan,
+    engage: Engage,
+    timer: Callable[[], float] | None,
+    *,
+    late_counts: bool,
+    preflight: bool = False,
+    only_check: bool = False,
+) -> Pilot:
     """Observer, controller and phases for a plan; takes some seconds where the solver is not compiled yet.
 
     Args:
@@ -97,16 +106,23 @@ def build_pilot(plan: FlightPlan, engage: Engage, timer: Callable[[], float] | N
         engage: who brings the vehicle into offboard.
         timer: measures the solver (perf_counter); None leaves it out.
         late_counts: whether a solve that took too long by the timer is replaced; not where time is simulated.
+        preflight: see `Pilot`.
+        only_check: see `Pilot`.
     """
-    from uasfly.control.controller import Controller, NmpcController, PidController
     from uasfly.observer.observer import Observer
 
-    controller: Controller
+    controller = build_controller(plan, timer, late_counts=late_counts)
+    observer = Observer(plan.airframe)
+    return Pilot(plan.airframe, plan.mission, observer, controller, engage, preflight=preflight, only_check=only_check)
+
+
+def build_controller(plan: FlightPlan, timer: Callable[[], float] | None, *, late_counts: bool) -> Controller:
+    """The controller of a plan, see `build_pilot`."""
+    from uasfly.control.controller import NmpcController, PidController
+
     if plan.controller == "nmpc":
-        controller = NmpcController(plan.airframe, timer=timer, deadline_s=None if late_counts else math.inf)
-    else:
-        controller = PidController(plan.airframe, timer=timer)
-    return Pilot(plan.airframe, plan.mission, Observer(plan.airframe), controller, engage)
+        return NmpcController(plan.airframe, timer=timer, deadline_s=None if late_counts else math.inf)
+    return PidController(plan.airframe, timer=timer)
 
 
 def _split_settings(settings: list[str]) -> dict[str, dict[str, object]]:

@@ -13,8 +13,10 @@ import numpy as np
 from uasfly.airframe import Airframe
 from uasfly.control.authority import AuthorityMeter
 from uasfly.control.controller import Controller, ControlResult
+from uasfly.flight.clearance import Clearance
 from uasfly.flight.course import Course
 from uasfly.flight.monitors import Monitors, Watched
+from uasfly.flight.preflight import Preflight, announcements, as_pilot_flies, stop_reason
 from uasfly.flight.response import Response
 from uasfly.flight.sequencer import EndingAction, Engage, Sequencer
 from uasfly.flight.view import VehicleView
@@ -25,6 +27,7 @@ from uasfly.messages import (
     Array,
     Authority,
     Phase,
+    PreflightCheck,
     ReferenceHorizon,
     Request,
     Sample,
@@ -33,6 +36,7 @@ from uasfly.messages import (
     Status,
 )
 from uasfly.mission import Mission
+from uasfly.observer.diagnosis import Diagnosis
 from uasfly.observer.observer import Observer
 
 TARGET_FRESH_S = 0.5  # an older attitude target is not what the vehicle is being told
@@ -41,19 +45,39 @@ _ENDINGS = {Action.END: None, Action.RETURN: EndingAction.RETURN, Action.LAND: E
 
 @dataclass(frozen=True, slots=True)
 class StepResult:
-    """What a step wants: a setpoint to send (None: send nothing), requests to the vehicle, and what it has to say."""
+    """What a step wants: a setpoint to send (None: send nothing), requests to the vehicle, and what it has to say.
+
+    `preflight` holds the checks in the step in which they were made.
+    """
 
     setpoint: Setpoint | None
     requests: tuple[Request, ...]
     status: Status
     control: ControlResult | None
+    preflight: tuple[PreflightCheck, ...] = ()
 
 
 class Pilot:
-    """Flies one mission: observer, controller and phases behind one call a cycle."""
+    """Flies one mission: observer, controller and phases behind one call a cycle.
+
+    Args:
+        airframe, mission: what is flown.
+        observer, controller: made for this airframe.
+        engage: who brings the vehicle into offboard.
+        preflight: whether a preflight check comes before each take-off; its facts (`FactsSample`) have to be handed in.
+        only_check: the flight is over after the preflight check.
+    """
 
     def __init__(
-        self, airframe: Airframe, mission: Mission, observer: Observer, controller: Controller, engage: Engage
+        self,
+        airframe: Airframe,
+        mission: Mission,
+        observer: Observer,
+        controller: Controller,
+        engage: Engage,
+        *,
+        preflight: bool = False,
+        only_check: bool = False,
     ) -> None:
         self.airframe = airframe
         self.mission = mission
@@ -61,8 +85,13 @@ class Pilot:
         self.controller = controller
         self.view = VehicleView()
         self.sequencer = Sequencer(
-            engage, mission.takeoff.height_m, EndingAction(mission.ending.action), mission.monitors.telemetry
+            engage,
+            mission.takeoff.height_m,
+            EndingAction(mission.ending.action),
+            mission.monitors.telemetry,
+            clearance=Clearance(needed=preflight, only_check=only_check),
         )
+        self._preflight = Preflight(mission, airframe, engage)
         self.monitors = Monitors(mission, airframe)
         self.course = Course(mission, airframe.limits)
         self._meter = AuthorityMeter(airframe.limits, airframe.model, mission.transition.speed_m_s)
@@ -114,6 +143,7 @@ class Pilot:
 
         sequencer = self.sequencer
         requests = sequencer.step(time_s, self.view, estimate, self.course.done(time_s))
+        checks = self._check_before_flight(time_s, samples, estimate)
         setpoint, control, authority = None, None, None
         alarms: tuple[Alarm, ...] = ()
         if estimate is not None:
@@ -133,7 +163,28 @@ class Pilot:
             self.observer.sent(setpoint, in_offboard=sequencer.in_offboard)
         self._streamed = setpoint is not None
         self._control, self._time_s = control, time_s
-        return StepResult(setpoint, requests, self._status(time_s, estimate, authority, alarms), control)
+        return StepResult(setpoint, requests, self._status(time_s, estimate, authority, alarms), control, checks)
+
+    def _check_before_flight(
+        self, time_s: float, samples: tuple[Sample, ...], estimate: StateEstimate | None
+    ) -> tuple[PreflightCheck, ...]:
+        """Judge once, when all else is ready or has been given up; where the pilot flies already nothing stops."""
+        sequencer, preflight = self.sequencer, self._preflight
+        if sequencer.phase in (Phase.CONNECT, Phase.PREFLIGHT):
+            preflight.look(time_s, samples, self.view)
+        if not sequencer.clearance.awaited or not (self.done or preflight.has_facts(time_s)):
+            return ()
+        diagnosis = None if estimate is None else self._diagnosis(time_s)
+        origin = None if estimate is None else self._origin_of(estimate)
+        checks = preflight.judge(self.view, estimate, diagnosis, origin)
+        if self.view.in_air and sequencer.engage is Engage.PILOT and not sequencer.clearance.only_check:
+            checks = as_pilot_flies(checks)
+        sequencer.announcements += announcements(checks)
+        sequencer.clear(time_s, stop_reason(checks))
+        return checks
+
+    def _diagnosis(self, time_s: float) -> Diagnosis:
+        return self.observer.diagnose(time_s, self.mission.monitors.estimate.window_s)
 
     def _note_places(self, estimate: StateEstimate) -> None:
         if self._met is None:
@@ -188,7 +239,7 @@ class Pilot:
                 time_s=time_s,
                 flying=flying,
                 estimate=estimate,
-                diagnosis=self.observer.diagnose(time_s, self.mission.monitors.estimate.window_s),
+                diagnosis=self._diagnosis(time_s),
                 view=self.view,
                 origin=place,
                 home=self._home(place),

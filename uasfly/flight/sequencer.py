@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from uasfly.flight.asking import Asking
+from uasfly.flight.clearance import Clearance
 from uasfly.flight.readiness import unready
 from uasfly.flight.silence import Silence
 from uasfly.flight.view import VehicleView
@@ -72,6 +73,7 @@ class Sequencer:
         taken_over: somebody else has taken the vehicle out of the legs; the mission waits.
         silence: of the telemetry, and of this cycle itself.
         silence_ended: a silence after which the mission goes on has ended in this step.
+        clearance: where the preflight check stands; `clear` tells its outcome.
         announcements: new texts with their MAVLink severity, cleared by the reader.
     """
 
@@ -86,6 +88,7 @@ class Sequencer:
     announcements: list[tuple[int, str]] = field(default_factory=list)
     taken_over: bool = False
     silence_ended: bool = False
+    clearance: Clearance = field(default_factory=Clearance)
     silence: Silence = field(init=False)
     _entered_s: float = 0.0
     _asking: Asking = field(default_factory=Asking)
@@ -151,6 +154,16 @@ class Sequencer:
         else:
             self.end(time_s, reason)
 
+    def clear(self, time_s: float, reason: str) -> None:
+        """The preflight check has been made: go on; with a reason nothing is armed and the flight is over."""
+        self.clearance.awaited = False
+        if self.phase is Phase.PREFLIGHT and reason:
+            self._abort(time_s, reason)
+        elif self.phase is Phase.PREFLIGHT and self.clearance.only_check:
+            self._finish(time_s)
+        else:
+            self.clearance.given = True
+
     def end(self, time_s: float, reason: str, ending: EndingAction | None = None) -> None:
         """Leave the mission early: hold, then its ending (or this one); the outcome is "aborted" with this reason."""
         if self.phase in (Phase.ENDING, Phase.DONE, Phase.ABORTED):
@@ -197,24 +210,27 @@ class Sequencer:
             self._enter(time_s, Phase.PREFLIGHT)
         elif time_s - self._entered_s > DISCONNECT_S:
             missing = "heartbeat" if view.vehicle is None else "ODOMETRY"
-            self._abort(time_s, f"no {missing} from the vehicle within {DISCONNECT_S:.0f} s")
+            self._give_up(time_s, f"no {missing} from the vehicle within {DISCONNECT_S:.0f} s")
 
     def _preflight(
         self, time_s: float, view: VehicleView, estimate: StateEstimate | None, requests: list[Request]
     ) -> None:
         missing = unready(view, estimate)
         if missing:
-            self._ready_since_s = None
+            self._ready_since_s, self.clearance.awaited = None, False
             if self._unready_since_s is None:
                 self._unready_since_s = time_s
             if time_s - self._unready_since_s > PREFLIGHT_TIMEOUT_S:
-                self._abort(time_s, f"not ready to fly after {PREFLIGHT_TIMEOUT_S:.0f} s: {missing}")
+                self._give_up(time_s, f"not ready to fly after {PREFLIGHT_TIMEOUT_S:.0f} s: {missing}")
             return
         if self._ready_since_s is None:
             self._ready_since_s = time_s
         if time_s - self._ready_since_s < READY_S:
             return
         self._unready_since_s = None  # in pilot mode the wait may be long: only time in a row counts
+        self.clearance.awaited = self.clearance.needed and not self.clearance.given
+        if self.clearance.awaited:
+            return
         if view.armed and view.in_air:
             self._enter(time_s, Phase.ENGAGE)
         elif self.engage is Engage.AUTO:
@@ -369,7 +385,7 @@ class Sequencer:
     def _enter(self, time_s: float, phase: Phase) -> None:
         self.phase, self._entered_s = phase, time_s
         self._ready_since_s = self._unready_since_s = None
-        self._mode_seen = False
+        self._mode_seen = self.clearance.awaited = self.clearance.given = False
         self._asking.reset(time_s, RETRY_S)
         self.announcements.append((6, f"phase {phase.value}"))
 
@@ -377,6 +393,10 @@ class Sequencer:
         reason = self._abort_reason
         self._enter(time_s, Phase.ABORTED if reason else Phase.DONE)
         self.reason = reason
+
+    def _give_up(self, time_s: float, reason: str) -> None:
+        self._abort(time_s, reason)
+        self.clearance.awaited = self.clearance.needed  # it tells what else is wrong
 
     def _abort(self, time_s: float, reason: str) -> None:
         self.streaming = False

@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import math
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from uasfly.errors import FileError
-from uasfly.messages import Array, OdometrySample, Phase, Sample, Status, TruthSample
+from uasfly.messages import Array, OdometrySample, Phase, PreflightCheck, Sample, Status, TruthSample
 
 KEPT_CYCLES = 256  # truth and GNSS samples are compared with cycles up to this long ago
 
@@ -69,6 +69,7 @@ class SummaryCollector:
     _setpoint_times_s: list[float] = field(default_factory=list)
     _fallbacks: dict[str, int] = field(default_factory=dict)
     _warnings: list[str] = field(default_factory=list)
+    _preflight: list[dict[str, str]] = field(default_factory=list)
     _phase: Phase = Phase.CONNECT
     _reason: str = ""
 
@@ -108,6 +109,11 @@ class SummaryCollector:
         """A setpoint has left at `time_s`."""
         self._setpoint_times_s.append(time_s)
 
+    def preflight(self, checks: tuple[PreflightCheck, ...]) -> None:
+        """The preflight check was made; of several the last counts."""
+        if checks:
+            self._preflight = [{**asdict(check), "verdict": check.verdict.value} for check in checks]
+
     def timed(self, solve_ms: float | None, cycle_ms: float) -> None:
         """Times of one cycle by the driver's clock; `solve_ms` is None where nothing was solved."""
         if solve_ms is not None:
@@ -146,6 +152,7 @@ class SummaryCollector:
             "force_m_s2": [round(value, 4) for value in force.tolist()],
             "real_time_factor": round(self.duration_s / wall_s, 3) if wall_s > 0.0 else None,
             "warnings": list(self._warnings),
+            "preflight": list(self._preflight),
         }
 
     def _compare(self) -> None:

@@ -68,7 +68,7 @@ def refuse_several(url: ConnectionUrl, heard: list[HeardSystem]) -> None:
     Raises:
         LinkError: when more than one of the systems heard is a vehicle; the text lists them.
     """
-    vehicles = [str(system) for system in heard if system.autopilot]
+    vehicles = [str(system) for system in sorted(heard, key=lambda system: system.system_id) if system.autopilot]
     if len(vehicles) > 1:
         raise LinkError(
             f"{url}: expected one vehicle, heard {len(vehicles)}: {', '.join(vehicles)}. "

@@ -20,7 +20,7 @@ RELATIVE_TOLERANCE = 1e-5  # the wire carries single precision
 _INTEGERS = {1: "<B", 2: "<b", 3: "<H", 4: "<h", 5: "<I", 6: "<i"}  # MAV_PARAM_TYPE: layout of the first bytes
 
 Send = Callable[[str, str], object]
-Answer = asyncio.Future[float | None]
+Answer = asyncio.Future[float]
 
 
 class ParameterChannel:
@@ -73,10 +73,12 @@ class ParameterChannel:
         return dict(zip(wanted, await asyncio.gather(*map(one, wanted)), strict=True))
 
     def receive(self, fields: Mapping[str, Any]) -> None:
-        """Take a PARAM_VALUE."""
-        for answer in self._waiting.get(fields["param_id"], ()):
-            if not answer.done():
-                answer.set_result(parameter_value(fields))
+        """Take a PARAM_VALUE; one without a readable value is no answer."""
+        waiting = self._waiting.get(fields["param_id"], ())
+        value = parameter_value(fields) if waiting else None
+        for answer in waiting:
+            if value is not None and not answer.done():
+                answer.set_result(value)
 
     async def _ask(self, name: str, kind: str, message: str, interval_s: float, repeats: int) -> float | None:
         answer: Answer = asyncio.get_running_loop().create_future()

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Protocol
 
-from uasfly.messages import Request, Sample, Setpoint
+from uasfly.messages import Array, Request, Sample, Setpoint
 
 
 class VehicleLink(Protocol):
@@ -28,4 +29,29 @@ class VehicleLink(Protocol):
 
     def send_text(self, severity: int, text: str) -> None:
         """Send a status text for the ground station; severity as in MAVLink, 0 emergency .. 7 debug."""
+        ...
+
+
+class InspectedLink(VehicleLink, Protocol):
+    """A link that also tells what a preflight check asks for."""
+
+    async def read_parameters(self, names: Iterable[str]) -> dict[str, float | None]:
+        """Parameters of the vehicle by name; None for one that it does not tell."""
+        ...
+
+    async def home(self) -> Array | None:
+        """Home in PX4's local frame, (3,) m, ENU; None where it is not told."""
+        ...
+
+    def message_rates(self) -> dict[str, float]:
+        """Rates [Hz] at which messages arrive, by name."""
+        ...
+
+    def losses(self) -> dict[str, int]:
+        """What was lost, by cause."""
+        ...
+
+    @property
+    def round_trip_s(self) -> float:
+        """Smallest recent TIMESYNC round trip [s]; NaN before the first answer."""
         ...

@@ -79,6 +79,7 @@ _DEFAULTS: dict[str, int | float] = {
     "COM_OF_LOSS_T": 1.0,
     "COM_OBL_RC_ACT": 5,
     "COM_RCL_EXCEPT": 0,
+    "COM_DLL_EXCEPT": 0,
     "COM_RC_IN_MODE": 1,
     "COM_DISARM_PRFLT": 10.0,
     "COM_DISARM_LAND": 2.0,

@@ -65,6 +65,19 @@ def check_mission(mission: Mission, airframe: Airframe) -> list[Finding]:
     return sorted(findings, key=lambda finding: finding.severity != "error")
 
 
+def check_way_in(mission: Mission, trajectory: MissionTrajectory) -> list[Finding]:
+    """Where the way from the trajectory's start to the first leg leaves the mission's limits.
+
+    Args:
+        mission: the limits.
+        trajectory: of this mission, with the take-off point at zero: from where the vehicle really begins.
+    """
+    first, peaks = trajectory.spans[0], _Peaks()
+    for reference in _samples(trajectory, first):
+        peaks.add(mission, reference)
+    return list(_within_fence(mission, first, peaks))
+
+
 def check_airframe(airframe: Airframe) -> list[Finding]:
     """Whether an airframe can hold the wind that its own limits name."""
     limits, most = airframe.limits, hover_wind_limit_m_s(airframe)
