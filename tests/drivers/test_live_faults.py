@@ -17,8 +17,8 @@ from uasfly.control.protocol import ControlResult, ReferenceAt
 from uasfly.drivers.live import fly
 from uasfly.drivers.plan import FlightPlan, load_plan
 from uasfly.drivers.watching import BACKLOG, BackgroundWatch, Cycle
+from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot
-from uasfly.flight.sequencer import Engage
 from uasfly.messages import (
     FlightMode,
     OdometrySample,

@@ -20,9 +20,9 @@ from uasfly.drivers.live import fly
 from uasfly.drivers.plan import load_plan
 from uasfly.drivers.preflight import WARM_STEPS, gather_facts, time_solver
 from uasfly.errors import LinkError
+from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot
 from uasfly.flight.preflight import PARAMETERS
-from uasfly.flight.sequencer import Engage
 from uasfly.messages import Array, FactsSample, NamedValue, PreflightCheck, Status, Verdict
 from uasfly.record.reader import LogReader
 

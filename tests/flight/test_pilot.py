@@ -11,8 +11,8 @@ import pytest
 
 from tests.observer.airframes import f550
 from uasfly.control.protocol import ControlResult, ReferenceAt
+from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot, StepResult
-from uasfly.flight.sequencer import Engage
 from uasfly.frames import quaternion_from_euler
 from uasfly.messages import (
     Array,

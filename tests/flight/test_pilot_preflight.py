@@ -8,9 +8,9 @@ import pytest
 
 from tests.flight.preflight.gathering import CHARGED, facts, health
 from tests.flight.test_pilot import PERIOD_S, Flight
+from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot, StepResult
 from uasfly.flight.preflight.preflight import FACTS_PATIENCE_S
-from uasfly.flight.sequencer import Engage
 from uasfly.messages import FactsSample, Phase, RequestKind, Verdict
 
 

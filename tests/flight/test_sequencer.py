@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from uasfly.flight.choices import EndingAction, Engage
 from uasfly.flight.clearance import Clearance
-from uasfly.flight.sequencer import EndingAction, Engage, Sequencer
+from uasfly.flight.sequencer import Sequencer
 from uasfly.flight.view import VehicleView
 from uasfly.messages import (
     FlightMode,

@@ -20,8 +20,8 @@ from uasfly.drivers.plan import FlightPlan, build_pilot, load_plan
 from uasfly.drivers.preflight import gather_facts, time_solver
 from uasfly.drivers.watching import Watch
 from uasfly.errors import UasflyError
+from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot
-from uasfly.flight.sequencer import Engage
 from uasfly.link.mavsdk_link import MavsdkLink
 
 CONNECT_TIMEOUT_S = 10.0

@@ -11,8 +11,8 @@ from uasfly.airframe import Airframe
 from uasfly.control.protocol import Controller
 from uasfly.errors import UasflyError
 from uasfly.files import find_file, load_file, parse_overrides
+from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot
-from uasfly.flight.sequencer import Engage
 from uasfly.mission import Mission
 from uasfly.sim.plant import Plant
 from uasfly.sim.scenario import Scenario

@@ -10,7 +10,7 @@ import numpy as np
 
 from uasfly.drivers.plan import FlightPlan, build_pilot
 from uasfly.drivers.watching import Cycle, Watch
-from uasfly.flight.sequencer import Engage
+from uasfly.flight.choices import Engage
 from uasfly.flight.summary import SummaryCollector
 from uasfly.link.in_process import InProcessLink
 from uasfly.record.writer import LogWriter

@@ -13,12 +13,13 @@ import numpy as np
 from uasfly.airframe import Airframe
 from uasfly.control.authority import AuthorityMeter
 from uasfly.control.controller import Controller, ControlResult
+from uasfly.flight.choices import EndingAction, Engage
 from uasfly.flight.clearance import Clearance
 from uasfly.flight.course import Course
 from uasfly.flight.monitors import Monitors, Watched
 from uasfly.flight.preflight import Preflight, announcements, as_pilot_flies, stop_reason
 from uasfly.flight.response import Response
-from uasfly.flight.sequencer import EndingAction, Engage, Sequencer
+from uasfly.flight.sequencer import Sequencer
 from uasfly.flight.view import VehicleView
 from uasfly.frames import euler_from_quaternion
 from uasfly.messages import (

@@ -7,9 +7,9 @@ and nothing that is sent acts. In the legs the mission then waits: the pilot's n
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import Enum
 
 from uasfly.flight.asking import Asking
+from uasfly.flight.choices import ENDING_MODES, ENDING_REQUESTS, EndingAction, Engage
 from uasfly.flight.clearance import Clearance
 from uasfly.flight.readiness import unready
 from uasfly.flight.silence import Silence
@@ -28,34 +28,6 @@ LANDING_TIMEOUT_S = 240.0
 HEARTBEAT_GRACE_S = 1.5  # a heartbeat that tells the old mode may still be on its way after an accepted change
 DISCONNECT_S = 15.0
 REFUSALS = 2  # of the ending, before the stream is left to PX4's failsafe
-
-
-class Engage(Enum):
-    """Who arms, takes off and switches to offboard: uasfly, or the pilot with the remote control."""
-
-    AUTO = "auto"
-    PILOT = "pilot"
-
-
-class EndingAction(Enum):
-    """How a mission ends."""
-
-    LAND = "land"
-    HOLD = "hold"
-    RETURN = "return"
-
-
-_ENDING_REQUESTS = {
-    EndingAction.LAND: RequestKind.LAND,
-    EndingAction.HOLD: RequestKind.HOLD,
-    EndingAction.RETURN: RequestKind.RETURN,
-}
-_BEFORE_ENDING = frozenset({FlightMode.TAKEOFF, FlightMode.OFFBOARD, FlightMode.HOLD, FlightMode.DESCEND})
-_ENDING_MODES = {
-    EndingAction.LAND: _BEFORE_ENDING | {FlightMode.LAND},
-    EndingAction.HOLD: _BEFORE_ENDING,
-    EndingAction.RETURN: _BEFORE_ENDING | {FlightMode.RETURN, FlightMode.LAND},
-}
 
 
 @dataclass(slots=True)
@@ -180,7 +152,7 @@ class Sequencer:
         """Stop at once: no more setpoints; `hand_over` where the vehicle would be left without anybody."""
         if self.phase in (Phase.DONE, Phase.ABORTED):
             return
-        ends_by_itself = self.phase is Phase.ENDING and _ENDING_REQUESTS[self.ending] in self._asking.accepted
+        ends_by_itself = self.phase is Phase.ENDING and ENDING_REQUESTS[self.ending] in self._asking.accepted
         self.hand_over = self._flies and not ends_by_itself
         self._abort(time_s, reason)
 
@@ -302,10 +274,10 @@ class Sequencer:
             self._ending(time_s, view, requests)
 
     def _ending(self, time_s: float, view: VehicleView, requests: list[Request]) -> None:
-        action, asking = _ENDING_REQUESTS[self.ending], self._asking
+        action, asking = ENDING_REQUESTS[self.ending], self._asking
         landed = view.vehicle is not None and not view.in_air and not view.armed
         mode_known = not self.silence.stale and not self.silence.just_ended(time_s)
-        foreign = view.mode is not self._mode and view.mode not in _ENDING_MODES[self.ending]
+        foreign = view.mode is not self._mode and view.mode not in ENDING_MODES[self.ending]
         if view.in_air and mode_known and foreign:
             self._taken(time_s, self._mode.value, view)
             return

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from tests.observer.airframes import f550
+from uasfly.flight.choices import Engage
 from uasfly.flight.preflight import judge
 from uasfly.flight.preflight.gathered import Gathered
-from uasfly.flight.sequencer import Engage
 from uasfly.flight.view import VehicleView
 from uasfly.messages import (
     BatterySample,

@@ -20,8 +20,8 @@ from tests.flight.preflight.gathering import (
     verdict,
     view,
 )
+from uasfly.flight.choices import Engage
 from uasfly.flight.preflight import PARAMETERS, judge
-from uasfly.flight.sequencer import Engage
 from uasfly.link.parameters import parameter_value
 from uasfly.messages import Verdict
 from uasfly.sim.parameters import ParameterTable

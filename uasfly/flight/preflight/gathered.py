@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from uasfly.airframe import Airframe
-from uasfly.flight.sequencer import Engage
+from uasfly.flight.choices import Engage
 from uasfly.flight.view import VehicleView
 from uasfly.messages import Array, FactsSample, PreflightCheck, StateEstimate, Verdict
 from uasfly.mission import Mission

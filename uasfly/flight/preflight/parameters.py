@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from uasfly.flight.choices import Engage
 from uasfly.flight.preflight.gathered import Gathered, Subject
 from uasfly.flight.preflight.place import may_return
-from uasfly.flight.sequencer import Engage
 from uasfly.messages import PreflightCheck
 
 PARAMETERS = (

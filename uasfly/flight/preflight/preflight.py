@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import deque
 
 from uasfly.airframe import Airframe
+from uasfly.flight.choices import Engage
 from uasfly.flight.preflight.gathered import Gathered
 from uasfly.flight.preflight.judging import judge
-from uasfly.flight.sequencer import Engage
 from uasfly.flight.view import VehicleView
 from uasfly.messages import Array, FactsSample, PreflightCheck, Sample, StateEstimate
 from uasfly.mission import Mission
