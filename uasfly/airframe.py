@@ -79,6 +79,10 @@ class Weights(FileModel):
     pitch: Positive
     thrust: Positive
     terminal: Annotated[float, Field(ge=0.0, description="terminal weight as a multiple of the stage weights")]
+    move: Annotated[
+        float,
+        Field(ge=0.0, le=20.0, description="weight on the first input's step from the last command, as a multiple"),
+    ] = 0.0
 
 
 class ControllerSettings(FileModel):

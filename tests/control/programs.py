@@ -18,12 +18,13 @@ LINEARISE, PATTERN = linearisation_function()
 PAPER = Weights(position=(25, 25, 17), velocity=(11, 11, 11), tilt=(1, 1), roll=135, pitch=135, thrust=750, terminal=10)
 
 
-def small_problem(nodes: int = 15, *, tight: bool = False) -> Problem:
-    """The f550's problem on a short grid, with wide bounds or with the paper's."""
+def small_problem(nodes: int = 15, *, tight: bool = False, move: float = 0.0) -> Problem:
+    """The f550's problem on a short grid, with wide bounds or with the paper's, and a weight on the first step."""
     tilt = 0.1 if tight else np.radians(30.0)
     thrust = (0.31, 0.38) if tight else (0.15, 0.75)
     grid = Grid.from_intervals(geometric_intervals(3.0, nodes, 0.02))
-    return problem_from_weights(grid, PAPER, np.array((thrust[0], -tilt, -tilt)), np.array((thrust[1], tilt, tilt)))
+    weights = PAPER.model_copy(update={"move": move})
+    return problem_from_weights(grid, weights, np.array((thrust[0], -tilt, -tilt)), np.array((thrust[1], tilt, tilt)))
 
 
 def random_program(rng: np.random.Generator, problem: Problem, error_m: float = 3.0) -> StageQp:

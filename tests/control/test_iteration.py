@@ -179,3 +179,18 @@ def test_an_unknown_backend_is_refused() -> None:
     problem = small_problem()
     with pytest.raises(ValueError, match='"auto", "c" or "vm"'):
         make_backend(problem, Workspace(problem), "fast")
+
+
+def test_the_first_input_keeps_to_the_last_command_as_far_as_it_weighs(backend_name: str) -> None:
+    """Nothing without a weight, next to no step with a great one; the later inputs are free either way."""
+    before = np.array((0.4, 0.1, -0.1))
+    steps = []
+    for move in (0.0, 20.0, 1e6):
+        problem = small_problem(25, move=move)
+        rti = RealTimeIteration(problem, backend_name)
+        load(rti, START, 0.4, 0.1, FORCE, 10.0)
+        assert rti.solve(10.0, iterations=6, before=before) is SolveStatus.CONVERGED
+        steps.append(float(np.abs(rti.workspace.inputs[0] - before).max()))
+        assert float(np.abs(rti.workspace.inputs[3] - before).max()) > 0.05
+    assert steps[0] > steps[1] > steps[2]
+    assert steps[2] < 1e-3

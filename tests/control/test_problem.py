@@ -46,3 +46,20 @@ def test_the_terminal_weight_is_a_multiple_of_the_stage_weights() -> None:
     weights = Weights(position=(2, 3, 4), velocity=(5, 6, 7), tilt=(8, 9), roll=1, pitch=1, thrust=1, terminal=7)
     problem = problem_from_weights(Grid.from_intervals(np.full(5, 0.1)), weights, -np.ones(3), np.ones(3))
     np.testing.assert_allclose(problem.state_weights[-1], 7.05 * np.arange(2.0, 10.0))
+
+
+def test_a_step_of_the_first_input_costs_what_the_problem_says() -> None:
+    """The blended reference has the gradient of both terms: the stage's and that of the step from the last command."""
+    weights = Weights(
+        position=(2, 3, 4), velocity=(5, 6, 7), tilt=(8, 9), roll=3, pitch=4, thrust=5, terminal=7, move=1.5
+    )
+    problem = problem_from_weights(Grid.from_intervals(np.full(5, 0.1)), weights, -np.ones(3), np.ones(3))
+    stage = 0.1 * np.array((5.0, 3.0, 4.0))
+    np.testing.assert_allclose(problem.move_weights, 1.5 * stage)
+    np.testing.assert_allclose(problem.input_weights[1], stage)
+    inputs, reference, before = np.array((0.4, 0.1, -0.2)), np.array((0.3, 0.0, 0.1)), np.array((0.5, -0.1, 0.3))
+    blended = problem.first_input_reference(reference, before)
+    np.testing.assert_allclose(
+        problem.input_weights[0] * (inputs - blended),
+        stage * (inputs - reference) + 1.5 * stage * (inputs - before),
+    )

@@ -76,13 +76,22 @@ class RealTimeIteration:
         self.backend, self.announcement = make_backend(problem, self.workspace, backend, options)
         self.plan_start_s: float | None = None
 
-    def solve(self, start_s: float, iterations: int = 1) -> SolveStatus:
-        """Plan from `start_s` on [s]; on a cold start at least three iterations."""
+    def solve(self, start_s: float, iterations: int = 1, before: Array | None = None) -> SolveStatus:
+        """Plan from `start_s` on [s]; on a cold start at least three iterations.
+
+        Args:
+            start_s: time of the plan's first node.
+            iterations: how many.
+            before: (3,) inputs commanded until then; without them the first input is as free as any.
+        """
         if not math.isfinite(start_s):
             return SolveStatus.BAD_INPUT
         status = self.backend.references()
         if status is not SolveStatus.CONVERGED:
             return status
+        first = self.workspace.input_reference[0]
+        if before is not None and self.problem.moves_weigh:
+            first[:] = self.problem.first_input_reference(first, before)
         elapsed = -1.0
         if self.plan_start_s is not None and 0.0 <= start_s - self.plan_start_s <= LONGEST_SHIFT_S:
             elapsed = start_s - self.plan_start_s

@@ -67,6 +67,7 @@ class NmpcController:
         self._fallback = ""
         self._time_s: float | None = None
         self._force = np.zeros(3)
+        self._commanded: Array | None = None  # thrust, roll and pitch that act until the next setpoint does
         self._announcement = self.solver.announcement
 
     @property
@@ -85,6 +86,7 @@ class NmpcController:
         self._yaw.reset(None if setpoint is None else setpoint.yaw_rad)
         self._backup.reset()
         self._fallback, self._time_s = "", None
+        self._commanded = None if setpoint is None else _inputs_of(setpoint)
 
     def step(
         self, time_s: float, estimate: StateEstimate, reference_at: ReferenceAt, battery_voltage_v: float | None
@@ -112,6 +114,7 @@ class NmpcController:
         text = self._announce(fallback, status)
         setpoint = self._guard.setpoint(time_s, inputs, yaw, yaw_rate)
         self._delay.sent(setpoint)
+        self._commanded = _inputs_of(setpoint)
         planned = fallback != "backup"
         return ControlResult(
             setpoint=setpoint,
@@ -147,9 +150,9 @@ class NmpcController:
         work.velocity[:] = reference.velocity_in_world
         work.acceleration[:] = reference.acceleration_in_world
         if self._timer is None:
-            return self.solver.solve(acts_s), 0.0
+            return self.solver.solve(acts_s, before=self._commanded), 0.0
         started = self._timer()
-        status = self.solver.solve(acts_s)
+        status = self.solver.solve(acts_s, before=self._commanded)
         return status, self._timer() - started
 
     def _choose(self, status: SolveStatus, solve_s: float, acts_s: float) -> tuple[Array | None, str]:
@@ -193,3 +196,7 @@ class NmpcController:
             return "the solver flies again"
         flies = "the last plan flies on" if fallback == "plan" else "the backup PIDs fly"
         return f"{_REASONS[status]}: {flies}"
+
+
+def _inputs_of(setpoint: Setpoint) -> Array:
+    return np.array((setpoint.thrust, setpoint.roll_rad, setpoint.pitch_rad))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,6 +16,10 @@ class Problem:
     """Least squares over a grid, inputs in a box; the order of states and inputs is that of `uasfly.model`.
 
     minimise  1/2 sum_k |x_k - xref_k|^2_Q_k + 1/2 sum_k |u_k - uref_k|^2_R_k  over k = 0..N (states), 0..N-1 (inputs)
+              + 1/2 |u_0 - u_before|^2_M
+
+    The last term is not the paper's. Without it the first input follows every bit of noise in the velocity, and jumps
+    between its bounds where wind takes all that tilt and thrust can give.
 
     Attributes:
         grid: node times.
@@ -23,6 +27,7 @@ class Problem:
             last node the terminal weight on top.
         input_weights: (N, 3) diagonals of R_k: the stage weight times the length of the interval.
         input_lower, input_upper: (3,) bounds of thrust, roll_d, pitch_d.
+        move_weights: (3,) diagonal of M; R_0 holds it already, see `first_input_reference`.
     """
 
     grid: Grid
@@ -30,6 +35,18 @@ class Problem:
     input_weights: Array
     input_lower: Array
     input_upper: Array
+    move_weights: Array = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def moves_weigh(self) -> bool:
+        """Whether M is not zero."""
+        return bool(self.move_weights.any())
+
+    def first_input_reference(self, reference: Array, before: Array) -> Array:
+        """Reference (3,) for u_0 that, weighed with R_0, stands for the paper's term and for that of M."""
+        share = self.move_weights / self.input_weights[0]
+        blended: Array = (1.0 - share) * reference + share * before
+        return blended
 
     def __post_init__(self) -> None:
         if not np.all(self.input_lower < self.input_upper):
@@ -49,7 +66,9 @@ def problem_from_weights(grid: Grid, weights: Weights, input_lower: Array, input
     state_weights = np.outer(share, stage_state)
     state_weights[-1] += weights.terminal * stage_state
     input_weights = np.outer(grid.interval_s, stage_input)
-    return Problem(grid, state_weights, input_weights, np.array(input_lower, float), np.array(input_upper, float))
+    move = weights.move * input_weights[0]
+    input_weights[0] += move
+    return Problem(grid, state_weights, input_weights, np.array(input_lower, float), np.array(input_upper, float), move)
 
 
 def problem_from_airframe(airframe: Airframe) -> Problem:

@@ -13,7 +13,7 @@ import time
 from uasfly.control.iteration import RealTimeIteration
 from uasfly.control.qp import SolveStatus
 from uasfly.flight.pilot import Pilot, StepResult
-from uasfly.messages import Phase, Sample
+from uasfly.messages import Array, Phase, Sample
 
 
 class _Window:
@@ -54,8 +54,10 @@ def failing_solver(window: _Window) -> None:
         _note(self, window, time_s)
         return result
 
-    def failing(self: RealTimeIteration, start_s: float, iterations: int = 1) -> SolveStatus:
-        return SolveStatus.FAILED if window.holds(now[0]) else solve(self, start_s, iterations)
+    def failing(
+        self: RealTimeIteration, start_s: float, iterations: int = 1, before: Array | None = None
+    ) -> SolveStatus:
+        return SolveStatus.FAILED if window.holds(now[0]) else solve(self, start_s, iterations, before)
 
     Pilot.step = noting  # type: ignore[method-assign]
     RealTimeIteration.solve = failing  # type: ignore[method-assign]
