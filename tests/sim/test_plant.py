@@ -53,6 +53,11 @@ def test_neighbours_on_the_hexacopter_spin_against_each_other() -> None:
         ("parameters.MC_ROL_P", 1.0, "MC_ROL_P"),
         ("battery.open_circuit", [[0.0, 12.0], [0.5, 13.0]], "charge must ascend from 0 to 1"),
         ("inertia_kg_m2", [0.02, 0.0, 0.02], "inertia_kg_m2"),
+        ("rotors.full_speed_rad_s", 1e200, "full_speed_rad_s: expected a number.*not above"),
+        ("rotors.torque_per_thrust_m", 0.0, "torque_per_thrust_m: expected a number, above"),
+        ("rotors.arm_length_m", 1e9, "arm_length_m: expected a number"),
+        ("parameters.MC_ROLL_P", float("nan"), "MC_ROLL_P: expected a number"),
+        ("parameters.MC_ROL_P", 1.0, "did you mean MC_ROLL_P"),
     ],
 )
 def test_a_plant_that_cannot_be_is_refused(field: str, value: object, said: str) -> None:
