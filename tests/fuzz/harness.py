@@ -129,7 +129,10 @@ def run_block(target: Target, seed: int, block: int, stop: int) -> Tally:
                     tally.findings.append(Finding(target.name, seed, index, problem))
             except (Exception, HangError):
                 tally.findings.append(Finding(target.name, seed, index, traceback.format_exc()))
-                session = None  # what comes after a failure tells nothing
+                if session is not None:
+                    with contextlib.suppress(Exception):
+                        session.close()
+                session = None  # what comes after a failure in it tells nothing
             took_s = time.process_time() - began_s
             if took_s > tally.slowest_s:
                 tally.slowest_s, tally.slowest_index = took_s, index

@@ -12,7 +12,7 @@ from tests.fuzz.live import bombard
 
 SEED = int(os.environ.get("UASFLY_FUZZ_SEED", "1"))
 INPUTS = {"mission": 200, "airframe": 150, "scenario": 150, "plant": 150, "flag": 200, "fault_line": 200}
-INPUTS |= {"vehicle": 1500, "link": 1500, "pilot": 250}
+INPUTS |= {"vehicle": 1000, "link": 1500, "pilot": 200}
 
 
 @pytest.mark.parametrize("name", list(TARGETS))
@@ -34,7 +34,7 @@ def test_an_input_can_be_repeated() -> None:
 
 def test_a_live_link_and_a_live_vehicle_outlive_what_is_thrown_at_them() -> None:
     """Real sockets, real MAVSDK: afterwards both still talk, and nothing has gone to the terminal."""
-    result = bombard(SEED, 1500)
+    result = bombard(SEED, 1000)
     assert result.exit_code == 0, result.problem
     assert result.problem == ""
     assert result.samples > 100
