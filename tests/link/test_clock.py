@@ -145,11 +145,18 @@ def test_before_the_first_answer_arrival_times_stand_in() -> None:
 def test_times_that_cannot_be_the_vehicles_clock_become_arrival_times() -> None:
     """UTC stamps, stale stamps and stamps of the future; true ones are kept and never lie after the arrival."""
     clock = ClockMap()
-    clock.exchange(1000.0, 10.0, 1000.0)
-    assert clock.to_host(9.9, 1000.0) == pytest.approx(999.9)
+    clock.exchange(1000.0, 100.0, 1000.0)
+    assert clock.to_host(99.9, 1000.0) == pytest.approx(999.9)
     assert clock.to_host(1.8e9, 1000.0) == 1000.0
-    assert clock.to_host(3.0, 1000.0) == 1000.0
-    assert clock.to_host(10.001, 1000.0) == 1000.0
+    assert clock.to_host(30.0, 1000.0) == 1000.0
+    assert clock.to_host(100.001, 1000.0) == 1000.0
+
+
+def test_a_sample_that_waited_in_a_buffer_stays_as_old_as_it_is() -> None:
+    """A process that was stopped for seconds must not take what it then finds for the present."""
+    clock = ClockMap()
+    clock.exchange(1000.0, 100.0, 1000.0)
+    assert clock.to_host(95.0, 1000.0) == pytest.approx(995.0)
 
 
 def test_setpoint_times_are_the_inverse_map() -> None:

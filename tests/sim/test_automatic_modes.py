@@ -51,14 +51,18 @@ def test_land_slows_down_with_height() -> None:
 
 
 def test_take_off_ramps_up_then_climbs_and_reports() -> None:
-    """The climb limit rises for MPC_TKO_RAMP_T; then the path climbs, and near its height the take-off is done."""
+    """The limit rises to MPC_Z_VEL_MAX_UP, the climb once it is positive; then the path; near its height it is done."""
     automatic = modes(MIS_TAKEOFF_ALT=3.0)
     automatic.enter(FlightMode.TAKEOFF, STILL, STILL, 0.0, True)
     assert automatic.update(STILL, STILL, True, False).idle
-    limits = [automatic.update(STILL, STILL, True, True).climb_limit_m_s for _ in range(round(3.0 / STEP))]
+    ramp = [automatic.update(STILL, STILL, True, True) for _ in range(round(3.0 / STEP))]
+    limits, wishes = [s.climb_limit_m_s for s in ramp], [s.velocity[2] for s in ramp]
     assert limits[0] < -2.4
     assert limits == sorted(limits)
-    assert limits[-1] == pytest.approx(1.5, abs=0.02)
+    assert limits[-1] == pytest.approx(3.0, abs=0.02)
+    assert max(wish for limit, wish in zip(limits, wishes, strict=True) if limit < 0.0) == 0.0
+    assert wishes == sorted(wishes)
+    assert wishes[-1] == pytest.approx(0.48 * 1.65, abs=0.02)
     assert not automatic.ramping
     assert not automatic.takeoff_done
     setpoints = ideal(automatic, STILL, 15.0)

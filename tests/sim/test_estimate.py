@@ -138,7 +138,7 @@ def test_reading_twice_gives_the_same() -> None:
 
 
 def test_losing_gnss_runs_away_is_told_and_jumps_back() -> None:
-    """Without positions the estimate drifts, turns invalid after 5 s, and jumps back with a new reset counter."""
+    """Without positions the estimate drifts, turns invalid after 5 s, jumps back, and is trusted 6.4 s later."""
     state = state_at(0.0)
     estimate = Estimate(QUIET, np.random.default_rng(4), state, STEP)
 
@@ -166,8 +166,13 @@ def test_losing_gnss_runs_away_is_told_and_jumps_back() -> None:
     assert back.reset_counter == drifted.reset_counter + 1
     assert math.hypot(*(back.position_in_world[:2])) < 1e-9
     assert not estimate.position_ok
-    wait(5.0)
+    wait(5.2)
+    assert not estimate.position_ok
+    wait(0.4)
     assert estimate.position_ok
+    assert not estimate.position_trusted
+    wait(0.8)
+    assert estimate.position_trusted
 
 
 def test_an_offset_moves_the_positions() -> None:

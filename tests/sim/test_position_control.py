@@ -42,6 +42,17 @@ def test_it_leans_towards_the_target_whatever_the_heading(yaw: float) -> None:
     assert euler_from_quaternion(np.array(answer.attitude))[2] == pytest.approx(yaw)
 
 
+def test_a_new_hover_thrust_is_no_bump() -> None:
+    """The integral takes over what it changes: the thrust goes on as it was, also while the vehicle accelerates."""
+    control = controller()
+    for target in (0.0, 0.5):
+        setpoint = MotionSetpoint((0.0, 0.0, target), STILL, 0.0)
+        before = control.update(setpoint, STILL, STILL, 0.34, WIDE)
+        after = control.update(setpoint, STILL, STILL, 0.40, WIDE)
+        assert after.thrust == pytest.approx(before.thrust, abs=0.001)
+        control.reset()
+
+
 def test_tilt_is_limited() -> None:
     """A far target asks for no more than the tilt limit."""
     answer = controller().update(MotionSetpoint((50.0, 0.0, 0.0), STILL, 0.0), STILL, STILL, 0.34, math.radians(12.0))

@@ -2,10 +2,12 @@ import math
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import development as dialect
 
 from tests.sim_mavlink.bench import Bench, only
 from tests.sim_mavlink.fakes import YAW_RAD
 from uasfly.frames import quaternion_from_euler
+from uasfly.messages import FlightMode
 from uasfly.sim.mavlink.motion_messages import microseconds, milliseconds
 
 EARTH_RADIUS_M = 6371000.0
@@ -108,6 +110,21 @@ def test_attitude_target_tells_the_thrust_while_armed(bench: Bench) -> None:
     m = _message(bench, "ATTITUDE_TARGET")
     assert (m.type_mask, m.thrust) == pytest.approx((0, 0.4))
     np.testing.assert_allclose(m.q, quaternion_from_euler(0.0, 0.0, math.pi / 2 - YAW_RAD), atol=1e-6)
+
+
+def test_attitude_target_in_offboard_is_the_last_setpoint(bench: Bench) -> None:
+    """Stamped with its time; where none comes it is silent, for good when disarmed, for half a second when armed."""
+    bench.vehicle.mode = FlightMode.OFFBOARD
+    assert not only(bench.run(1.0), "ATTITUDE_TARGET")
+    bench.ask(dialect.MAVLink_set_attitude_target_message(0, 1, 1, 7, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, 0.5))
+    (m,) = only(bench.run(1.0), "ATTITUDE_TARGET")
+    assert m.time_boot_ms == 1500
+    bench.vehicle.armed = True
+    bench.ask(dialect.MAVLink_set_attitude_target_message(0, 1, 1, 7, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, 0.5))
+    assert len(only(bench.run(0.5), "ATTITUDE_TARGET")) == 1
+    late = only(bench.run(0.5), "ATTITUDE_TARGET")
+    assert len(late) == pytest.approx(5, abs=1)
+    assert {m.time_boot_ms for m in late} == {2500}
 
 
 def test_vfr_hud_has_no_airspeed(bench: Bench) -> None:

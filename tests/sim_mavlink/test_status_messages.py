@@ -79,7 +79,7 @@ def test_landed_state_distinguishes_take_off_flight_and_landing(bench: Bench) ->
 
 
 def test_lost_gnss_shows_as_px4_shows_it(bench: Bench) -> None:
-    """SYS_STATUS and ESTIMATOR_STATUS change the bits that they change in the recording."""
+    """The position falls at once, what counts on GNSS after 7 s; the commander trusts a position for a second old."""
     messages = bench.run(1.1)
     status, estimator = only(messages, "SYS_STATUS")[-1], only(messages, "ESTIMATOR_STATUS")[-1]
     assert status.onboard_control_sensors_present == 50380847
@@ -90,12 +90,20 @@ def test_lost_gnss_shows_as_px4_shows_it(bench: Bench) -> None:
     bench.vehicle.in_air, bench.vehicle.armed, bench.vehicle.gnss_available = True, True, False
     messages = bench.run(1.1)
     status, estimator = only(messages, "SYS_STATUS")[-1], only(messages, "ESTIMATOR_STATUS")[-1]
-    assert status.onboard_control_sensors_present == 50380815
+    assert status.onboard_control_sensors_present == 50380847
     assert status.onboard_control_sensors_health == 320899135
-    assert estimator.flags == 101
+    assert estimator.flags == 869
     assert math.isnan(estimator.pos_horiz_ratio)
+    messages = bench.run(7.0)
+    status, estimator = only(messages, "SYS_STATUS")[-1], only(messages, "ESTIMATOR_STATUS")[-1]
+    assert status.onboard_control_sensors_present == 50380815
+    assert estimator.flags == 101
     bench.vehicle.gnss_available = True
+    messages = bench.run(0.9)
     assert _last(bench, "ESTIMATOR_STATUS").flags == 895
+    assert only(messages, "SYS_STATUS")[-1].onboard_control_sensors_health == 320899135
+    status = only(bench.run(0.5), "SYS_STATUS")[-1]
+    assert (status.onboard_control_sensors_present, status.onboard_control_sensors_health) == (50380847, 320915519)
 
 
 def test_battery_is_told_as_one_cell(bench: Bench) -> None:

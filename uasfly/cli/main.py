@@ -7,7 +7,7 @@ import sys
 import typer
 
 from uasfly import __version__
-from uasfly.cli import check, fly, rehearse, sim
+from uasfly.cli import check, faults, fly, rehearse, sim
 
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
@@ -39,6 +39,7 @@ fly.register(app)
 rehearse.register(app)
 check.register(app)
 sim.register(app)
+faults.register(app)
 
 
 def main() -> None:

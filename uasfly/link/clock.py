@@ -19,7 +19,7 @@ FLOOR_WINDOW = 64  # exchanges among which the smallest round trip counts as und
 
 REBOOT_STEP_S = 1.0
 REBOOT_COUNT = 3
-OLDEST_SAMPLE_S = 2.0
+OLDEST_SAMPLE_S = 60.0  # a process that was stopped finds old samples in its buffers: they must not pass for new ones
 
 
 class ClockMap:
@@ -132,7 +132,7 @@ class ClockMap:
         """Host time [s] at which the vehicle's clock showed `vehicle_s`, for a message that arrived at `arrival_s`.
 
         Arrival time where nothing better is known: before the first exchange, and for times that cannot be
-        the vehicle's clock (older than 2 s). Never later than the arrival.
+        the vehicle's clock (older than a minute). Never later than the arrival.
         """
         if not self._exchanges:
             return arrival_s

@@ -19,6 +19,7 @@ _ARRIVED_M = 1.0
 _FAR_BELOW_M = 1000.0
 _RETURN_CONE_PER_M = 2.0  # height above home over distance to it, near home
 _NEAR_HOME_M = 10.0  # NAV_ACC_RAD
+_TAKEOFF_ACCELERATION_M_S2 = 0.48  # of the climb that is asked for while the thrust ramps up (recording)
 
 
 class AutomaticModes:
@@ -40,6 +41,7 @@ class AutomaticModes:
         self._yaw_rad = 0.0
         self._climb_first = True
         self._ramp = 1.0
+        self._climb_wish = 0.0
         self.read_parameters()
         self.home: Vector = (0.0, 0.0, 0.0)
         self.takeoff_done = False
@@ -71,6 +73,7 @@ class AutomaticModes:
         self.takeoff_done = False
         self.ramping = mode is FlightMode.TAKEOFF and on_ground
         self._ramp = 0.0 if self.ramping else 1.0
+        self._climb_wish = 0.0
         if mode is FlightMode.TAKEOFF:
             asked = self.takeoff_height_m
             height = self._parameters.value("MIS_TAKEOFF_ALT") if asked is None else asked
@@ -124,11 +127,13 @@ class AutomaticModes:
         self._ramp += self._duration_s / max(value("MPC_TKO_RAMP_T"), self._duration_s)
         # The ramp starts at the velocity whose error takes all of the hover thrust away.
         lowest = -GRAVITY_M_S2 / max(value("MPC_Z_VEL_P_ACC"), 0.01)
-        climb = value("MPC_TKO_SPEED")
+        limit = lowest + min(self._ramp, 1.0) * (max(value("MPC_Z_VEL_MAX_UP"), 0.1) - lowest)
+        if limit > 0.0:
+            self._climb_wish += _TAKEOFF_ACCELERATION_M_S2 * self._duration_s
+        climb = min(self._climb_wish, value("MPC_TKO_SPEED"))
         if self._ramp >= 1.0:
             self.ramping = False
-            self._path = Approach(position, (0.0, 0.0, max(0.0, velocity[2])))
-        limit = lowest + min(self._ramp, 1.0) * (climb - lowest)
+            self._path = Approach(position, (0.0, 0.0, max(climb, velocity[2])))
         anchor = (self._target[0], self._target[1], position[2])
         return MotionSetpoint(anchor, (0.0, 0.0, climb), self._yaw_rad, track_height=False, climb_limit_m_s=limit)
 

@@ -240,7 +240,7 @@ class Autopilot:
         return Situation(
             now_s,
             now_s - self._setpoint_at_s,
-            self._estimate.position_ok,
+            self._estimate.position_trusted,
             battery_remaining,
             self.land_detector.landed,
         )

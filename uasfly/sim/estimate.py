@@ -22,7 +22,8 @@ from uasfly.sim.scenario import Sensors
 
 CONVERGED_S = 2.0  # after boot; PX4's simulator needs 2.1 s until it has a heading and a position
 DEAD_RECKONING_S = 5.0  # EKF2_NOAID_TOUT
-RECOVERY_S = 5.0  # of sound GNSS until PX4 trusts it again (recording: 5.7 s)
+RECOVERY_S = 5.4  # of sound GNSS until PX4's estimator is sure of its position again (recording: 4.7 to 5.7 s)
+PROBATION_S = 1.0  # from then until the commander relies on it (recording: 6.3 to 6.5 s of sound GNSS)
 _WANDER_STEPS = 10  # the wander is renewed every tenth step: its time constant is seconds
 _DEAD_RECKONING_M_S2 = 0.03  # sigma of the acceleration error that inertia is left with; assumed
 _USUAL_ACCURACY_M = 0.3
@@ -171,6 +172,12 @@ class Estimate:
         """Whether PX4 calls position and horizontal velocity valid."""
         now = self._steps * self._step_s
         return now >= CONVERGED_S and not self._gave_up(now) and now - self._found_since_s >= RECOVERY_S
+
+    @property
+    def position_trusted(self) -> bool:
+        """Whether PX4's commander relies on the position: valid, and that for a while."""
+        now = self._steps * self._step_s - PROBATION_S
+        return self.position_ok and now >= CONVERGED_S and now - self._found_since_s >= RECOVERY_S
 
     @property
     def attitude_ok(self) -> bool:

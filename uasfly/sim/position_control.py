@@ -88,8 +88,10 @@ class PositionControl:
         self._derivative_share = low_pass_share(value("MPC_VELD_LP"), self._duration_s)
 
     def reset(self) -> None:
-        """Forget integrals and the last velocity."""
+        """Forget integrals, the last velocity and the hover thrust that the integrals belong to."""
         self._integral = [0.0, 0.0, 0.0]
+        self._hover_thrust: float | None = None
+        self._last_acceleration_z = 0.0
         self._last_velocity: Vector | None = None
         self._derivative = [0.0, 0.0, 0.0]
 
@@ -109,11 +111,15 @@ class PositionControl:
             self.reset()
             return AttitudeSetpoint(_attitude(0.0, 0.0, 1.0, setpoint.yaw_rad), 0.0)
         self._differentiate(velocity)
+        self._absorb(hover_thrust)
         error_x, error_y, error_z = self._velocity_error(setpoint, position, velocity)
         acceleration_x, acceleration_y = self._horizontal_acceleration(setpoint, error_x, error_y)
         acceleration_z = self._vertical[0] * error_z + self._integral[2] - self._vertical[2] * self._derivative[2]
+        self._last_acceleration_z = acceleration_z
 
         low, high = self._thrust_range
+        if setpoint.climb_limit_m_s < math.inf:
+            low = 0.0  # PX4 takes the lower limit for flight only
         flat = math.hypot(acceleration_x, acceleration_y)
         slope = min(flat / GRAVITY_M_S2, math.tan(tilt_limit_rad))
         lift = max(_SMALLEST_THRUST, hover_thrust * (1.0 + acceleration_z / GRAVITY_M_S2))
@@ -129,9 +135,19 @@ class PositionControl:
         if setpoint.track_horizontal:
             self._integrate_horizontal(error_x, error_y, acceleration_x, acceleration_y, reached, flat)
         share = side / flat if flat > 1e-9 else 0.0
-        thrust = max(math.hypot(side, lift), 0.0 if setpoint.climb_limit_m_s < math.inf else low)
+        thrust = max(math.hypot(side, lift), low)
         attitude = _attitude(share * acceleration_x, share * acceleration_y, lift, setpoint.yaw_rad)
         return AttitudeSetpoint(attitude, min(thrust, high))
+
+    def _absorb(self, hover_thrust: float) -> None:
+        """Let the integral take over what a new hover thrust would change, so that the thrust goes on as it was.
+
+        As PX4's PositionControl::updateHoverThrust: T = hover (1 + a / g) is the same before and after.
+        """
+        if self._hover_thrust is not None:
+            specific_force = self._last_acceleration_z + GRAVITY_M_S2
+            self._integral[2] += specific_force * (self._hover_thrust / hover_thrust - 1.0)
+        self._hover_thrust = hover_thrust
 
     def _velocity_error(self, setpoint: MotionSetpoint, position: Vector, velocity: Vector) -> Vector:
         gain, vertical_gain = self._position_gain

@@ -9,9 +9,15 @@ from typing import Any
 
 BEGIN_S = 6.0  # after offboard: the glide onto the path is over
 HOVER_S = 22.0
+LIVE_HOVER_S = 14.0  # in real time every second counts
 HEIGHT_M = 1.5
 
-HOVER = (f"mission.legs=[{{type: hover, position_m: [0, 0, {HEIGHT_M}], duration_s: {HOVER_S}}}]",)
+
+def _hover(duration_s: float) -> tuple[str, ...]:
+    return (f"mission.legs=[{{type: hover, position_m: [0, 0, {HEIGHT_M}], duration_s: {duration_s}}}]",)
+
+
+HOVER, LIVE_HOVER = _hover(HOVER_S), _hover(LIVE_HOVER_S)
 TRACK = (
     f"mission.legs=[{{type: back_and_forth, start_m: [-3, 0, {HEIGHT_M}], end_m: [3, 0, {HEIGHT_M}], speed_m_s: 0.5, "
     "stop_s: 1, passes: 2}]",
@@ -67,10 +73,13 @@ class FaultCase:
     @property
     def all_settings(self) -> list[str]:
         """`--set` texts of the flight, the faults among them."""
-        if not self.faults:
-            return list(self.settings)
-        timed = [{"at_s": BEGIN_S, **fault} for fault in self.faults]
-        return [*self.settings, f"scenario.faults={json.dumps(timed)}"]
+        settings = list(self.settings)
+        if self.over_mavlink and self.settings is HOVER:
+            settings = list(LIVE_HOVER)
+        if self.faults:
+            timed = [{"at_s": BEGIN_S, **fault} for fault in self.faults]
+            settings.append(f"scenario.faults={json.dumps(timed)}")
+        return settings
 
     @property
     def over_mavlink(self) -> bool:

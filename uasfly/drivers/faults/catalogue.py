@@ -57,7 +57,7 @@ TELEMETRY = (
     ),
     FaultCase(
         "velocity_wrong",
-        "velocity wrong by 2 m/s for 6 s",
+        "velocity wrong by 2 m/s for 30 s",
         ("back off", "hand over", "aborted"),
         3.0,
         2.5,
@@ -91,7 +91,7 @@ TELEMETRY = (
     FaultCase(
         "silence_2s",
         "no telemetry and no setpoints for 2 s",
-        ("silent", "taken over", "taken up", *COMPLETES),
+        ("silent", "streams", *COMPLETES),
         1.5,
         0.4,
         _fault("silence", direction="both", duration_s=2),
@@ -136,7 +136,7 @@ TELEMETRY = (
 )
 
 VEHICLE = (
-    FaultCase("reboot", "the vehicle restarts in flight", ("aborted",), 3.0, 2.5, _fault("reboot"), live=True),
+    FaultCase("reboot", "the vehicle restarts in flight", ("silent", "aborted"), 3.0, 0.4, _fault("reboot"), live=True),
     FaultCase("battery_low", "battery at 25 %", ("warn", *COMPLETES), 0.3, 3.0, _fault("battery", charge=0.25)),
     FaultCase("battery_empty", "battery at 18 %", ("end", *LANDS), 0.3, 3.0, _fault("battery", charge=0.18)),
     FaultCase("motor_weak", "a motor at 70 %", COMPLETES, 0.5, None, _fault("motor", motor=0, effectiveness=0.7)),
@@ -257,18 +257,18 @@ PROGRAM = (
     FaultCase(
         "frozen",
         "SIGSTOP for 3 s",
-        ("stands still", "taken over", "taken up", *COMPLETES),
-        1.5,
-        0.2,
+        ("stands still", "streams", *COMPLETES),
+        2.5,  # a second of its last setpoint, then PX4's own hold, in gusts
+        0.25,
         act=Act.FREEZE,
     ),
     FaultCase("killed", "SIGKILL", ("killed", "vehicle in hold"), 2.5, 0.2, act=Act.KILL),
     FaultCase(
         "cycle_hangs",
         "one control cycle takes 3 s",
-        ("stands still", "taken over", "taken up", *COMPLETES),
-        1.5,
-        1.0,
+        ("stands still", "streams", *COMPLETES),
+        2.5,  # a second of its last setpoint, then PX4's own hold, in gusts
+        0.25,
         act=Act.HANG,
     ),
     FaultCase(

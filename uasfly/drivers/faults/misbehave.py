@@ -10,7 +10,7 @@ import importlib
 import sys
 import time
 
-from uasfly.control.nmpc_controller import NmpcController
+from uasfly.control.iteration import RealTimeIteration
 from uasfly.control.qp import SolveStatus
 from uasfly.flight.pilot import Pilot, StepResult
 from uasfly.messages import Phase, Sample
@@ -44,8 +44,8 @@ def hang(window: _Window) -> None:
 
 
 def failing_solver(window: _Window) -> None:
-    """Let every solve in the window fail."""
-    step, choose = Pilot.step, NmpcController._choose
+    """Let every solve in the window fail, and leave the plan as it was."""
+    step, solve = Pilot.step, RealTimeIteration.solve
     now = [0.0]
 
     def noting(self: Pilot, time_s: float, samples: tuple[Sample, ...]) -> StepResult:
@@ -54,11 +54,11 @@ def failing_solver(window: _Window) -> None:
         _note(self, window, time_s)
         return result
 
-    def failing(self: NmpcController, status: SolveStatus, solve_s: float, acts_s: float) -> object:
-        return choose(self, SolveStatus.FAILED if window.holds(now[0]) else status, solve_s, acts_s)
+    def failing(self: RealTimeIteration, start_s: float, iterations: int = 1) -> SolveStatus:
+        return SolveStatus.FAILED if window.holds(now[0]) else solve(self, start_s, iterations)
 
     Pilot.step = noting  # type: ignore[method-assign]
-    NmpcController._choose = failing  # type: ignore[method-assign, assignment]
+    RealTimeIteration.solve = failing  # type: ignore[method-assign]
 
 
 def _note(pilot: Pilot, window: _Window, time_s: float) -> None:

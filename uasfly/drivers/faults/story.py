@@ -6,7 +6,7 @@ in which things happened from the fault on (or from the start, where the legs we
 - `warn`, `slow down`, `hold`, `back off`, `end`, `return`, `land`, `hand over`: an alarm's action grew to this
 - `flies on`: the action is over, the mission goes on
 - `silent`, `streams`: setpoints stopped in flight, and came again
-- `stands still`: the control cycle did not run for more than 0.2 s
+- `stands still`: the control cycle did not run for more than 0.2 s; `streams` when it runs again
 - `taken over`, `taken up`: somebody else has the vehicle, the mission was taken up again
 - `asks hold`, `asks land`, `asks return`: requests to the vehicle
 - `completed`, `aborted`, `killed`: how it ended
@@ -99,8 +99,9 @@ class Story:
     def _status(self, time_s: float, status: Status) -> None:
         self.texts += [(time_s, text) for severity, text in status.announcements if severity <= 4]
         if status.phase in (Phase.LEGS, Phase.ENGAGE) and time_s - self._cycle_s > STILL_S:
-            self._tell(self._cycle_s, "stands still")
-            self._missed = 0
+            self._tell(self._cycle_s + STILL_S, "stands still")
+            self._tell(time_s, "streams")
+            self._sent_s, self._missed = time_s, 0
         self._cycle_s = time_s
         if status.action is not self._action:
             if status.action.grade > self._action.grade:

@@ -14,6 +14,7 @@ import time
 from typing import Any
 
 import numpy as np
+from pymavlink.dialects.v20 import development as dialect
 
 from uasfly.frames import euler_from_quaternion, swap_quaternion_enu_ned
 from uasfly.link.modes import flight_mode
@@ -25,6 +26,8 @@ MICRO, MILLI = 1e-6, 1e-3
 AUTOPILOT = 1
 CLOCK_STEP_S = 0.5  # the vehicle's clock has been moved by more than this: it was restarted or jumped
 BUFFER_BYTES = 65536
+LISTENER = (245, 191)  # system and component of the one who asks for the truth
+TRUTH_ID, TRUTH_INTERVAL_US, ASK_EVERY_S = 350, 20000, 1.0
 
 
 class Wire(threading.Thread):
@@ -43,6 +46,8 @@ class Wire(threading.Thread):
         self.program_port = program_port
         self._to_program = _socket()
         self._to_vehicle = _socket()
+        self._asking = _socket()  # what is asked for here is answered here, and sent to everybody
+        self._asked_s = -math.inf
         self.vehicle_port = int(self._to_vehicle.getsockname()[1])
         self.setpoints: list[tuple[float, float, Setpoint]] = []
         self.truths: list[TruthSample] = []
@@ -67,6 +72,21 @@ class Wire(threading.Thread):
         self.join(2.0)
         self._to_program.close()
         self._to_vehicle.close()
+        self._asking.close()
+
+    def left_offboard_s(self) -> float:
+        """When the vehicle was in another mode again, NaN where it was not."""
+        after = (time_s for time_s, mode in self.modes if time_s > self.offboard_s and mode is not FlightMode.OFFBOARD)
+        return next(after, math.nan)
+
+    def _ask_for_truth(self, now: float, vehicle: Any) -> None:
+        """Again and again: a vehicle that restarts forgets it, and a bad link loses it."""
+        if now - self._asked_s > ASK_EVERY_S:
+            self._asked_s = now
+            message = dialect.MAVLink_command_long_message(
+                0, AUTOPILOT, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, 0, TRUTH_ID, TRUTH_INTERVAL_US, 0, 0, 0, 0, 0
+            )
+            self._send(self._asking, bytes(message.pack(dialect.MAVLink(None, *LISTENER))), vehicle)
 
     def _relay(self, end: socket.socket) -> None:
         try:
@@ -76,6 +96,7 @@ class Wire(threading.Thread):
         now = time.monotonic()
         if end is self._to_vehicle:
             self._vehicle = sender
+            self._ask_for_truth(now, sender)
             self._send(self._to_program, data, ("127.0.0.1", self.program_port))
             for message in self._up.messages(data):
                 self._from_vehicle(now, message)

@@ -7,12 +7,14 @@ import math
 from pymavlink.dialects.v20 import development as dialect
 
 from uasfly.frames import swap_quaternion_enu_ned
+from uasfly.messages import FlightMode
 from uasfly.sim.mavlink.framing import Message
 from uasfly.sim.mavlink.vehicle_view import VehicleView, quadruple
 from uasfly.sim.sensors import HOME_ALTITUDE_M, HOME_LATITUDE_DEG, HOME_LONGITUDE_DEG, geographic_position
 
 LOCAL_NED = dialect.MAV_FRAME_LOCAL_NED
 IDLE_ATTITUDE_THRUST = 0.001
+TARGET_REPEATED_S = 0.5
 # variances that PX4's estimator settles at in the recording: position m^2, attitude rad^2, velocity (m/s)^2
 HEIGHT_VARIANCE_M2 = 1.2e-3
 ATTITUDE_VARIANCE_RAD2 = 3e-4
@@ -62,12 +64,29 @@ def attitude_quaternion(view: VehicleView) -> Message:
     )
 
 
-def attitude_target(view: VehicleView) -> Message:
-    """ATTITUDE_TARGET, whichever mode sets the target; a disarmed vehicle holds its heading with PX4's idle thrust."""
-    sample = view.vehicle.attitude_target()
-    thrust = sample.thrust if view.state.armed else IDLE_ATTITUDE_THRUST
-    quaternion = quadruple(swap_quaternion_enu_ned(sample.quaternion_body_to_world))
-    return dialect.MAVLink_attitude_target_message(milliseconds(sample.time_s), 0, quaternion, 0.0, 0.0, 0.0, thrust)
+class AttitudeTargets:
+    """ATTITUDE_TARGET, whichever mode sets the target; a disarmed vehicle holds its heading with PX4's idle thrust.
+
+    In offboard it is the last setpoint and the time when that came. Where none comes any more PX4 is silent, and says
+    the old one again after half a second, for as long as it is armed.
+    """
+
+    def __init__(self) -> None:
+        self._said_s = -math.inf
+
+    def __call__(self, view: VehicleView) -> Message | None:
+        """Build the message; None where nothing is new."""
+        sample = view.vehicle.attitude_target()
+        stamp_s = sample.time_s
+        if view.state.mode is FlightMode.OFFBOARD:
+            stamp_s = view.last_setpoint_s
+            old = stamp_s == self._said_s
+            if stamp_s == -math.inf or (old and not (view.state.armed and view.time_s - stamp_s > TARGET_REPEATED_S)):
+                return None
+        self._said_s = stamp_s
+        thrust = sample.thrust if view.state.armed else IDLE_ATTITUDE_THRUST
+        quaternion = quadruple(swap_quaternion_enu_ned(sample.quaternion_body_to_world))
+        return dialect.MAVLink_attitude_target_message(milliseconds(stamp_s), 0, quaternion, 0.0, 0.0, 0.0, thrust)
 
 
 def local_position(view: VehicleView) -> Message:

@@ -60,9 +60,9 @@ def current_mode(view: VehicleView) -> Message:
 
 
 def system_status(view: VehicleView) -> Message:
-    """SYS_STATUS. As recorded, lost GNSS leaves "present" and "enabled", a lost position leaves "health"."""
-    gps = 0 if view.health.gnss_fix >= 3 else SENSOR_GPS
-    healthy = SENSORS_HEALTHY & ~(0 if view.health.position_ok else SENSOR_POSITION)
+    """SYS_STATUS. As recorded, GNSS leaves "present" and "enabled" when it is given up, a lost position "health"."""
+    gps = 0 if view.gnss_present else SENSOR_GPS
+    healthy = SENSORS_HEALTHY & ~(0 if view.position_trusted else SENSOR_POSITION)
     healthy |= PREARM_CHECK if view.can_arm or view.state.armed else 0
     battery = view.vehicle.battery()
     return dialect.MAVLink_sys_status_message(
@@ -100,7 +100,7 @@ def estimator_status(view: VehicleView) -> Message:
     flags = _ALWAYS if health.attitude_ok else 0
     flags |= _VELOCITY_HORIZONTAL if health.velocity_ok else 0
     flags |= _POSITION_HORIZONTAL if health.position_ok else 0
-    flags |= _PREDICTED_POSITION if health.position_ok or health.velocity_ok else 0
+    flags |= _PREDICTED_POSITION if health.attitude_ok and view.gnss_used else 0
     flags |= 0 if view.state.in_air else _AT_REST
     fused = TEST_RATIO if health.gnss_fix >= 3 else math.nan
     return dialect.MAVLink_estimator_status_message(

@@ -1,9 +1,10 @@
 """Which messages the vehicle sends by itself on the onboard link, and how often: read from the recording of PX4.
 
 PX4 streams further messages there that this vehicle leaves out: DISTANCE_SENSOR, ESC_INFO, ESC_STATUS,
-SERVO_OUTPUT_RAW, GNSS_INTEGRITY and OPEN_DRONE_ID_* (it has none of these devices), ESTIMATOR_SENSOR_FUSION_STATUS,
-LINK_NODE_STATUS, TIME_ESTIMATE_TO_TARGET, EVENT and CURRENT_EVENT_SEQUENCE (not in pymavlink's dialects; texts go out
-as STATUSTEXT, which PX4 sends to ground stations only).
+SERVO_OUTPUT_RAW, GNSS_INTEGRITY and OPEN_DRONE_ID_* (it has none of these devices), POSITION_TARGET_GLOBAL_INT (it does
+not tell the targets of its own modes), ESTIMATOR_SENSOR_FUSION_STATUS, LINK_NODE_STATUS, TIME_ESTIMATE_TO_TARGET, EVENT
+and CURRENT_EVENT_SEQUENCE (not in pymavlink's dialects; texts go out as STATUSTEXT, which PX4 sends to ground stations
+only).
 As PX4 does for messages that it knows and has no data for, their intervals can be set and they stay silent.
 """
 
@@ -33,9 +34,9 @@ PROCESSOR_HZ = 5.0
 # Further streams of PX4 (main of August 2026): an interval for them is accepted, and nothing comes.
 # fmt: off
 SILENT_IDS = (
-    8, 25, 26, 36, 62, 65, 69, 76, 93, 106, 112, 115, 116, 124, 129, 132, 137, 143, 149, 192, 225, 231, 235, 246, 250,
-    251, 253, 254, 261, 263, 264, 265, 280, 281, 283, 284, 285, 286, 290, 291, 292, 296, 330, 339, 340, 360, 361, 371,
-    372, 375, 380, 395, 397, 435, 441, 514, 10001, 10002, 12900, 12901, 12904, 12918, 12920,
+    8, 25, 26, 36, 62, 65, 69, 76, 87, 93, 106, 112, 115, 116, 124, 129, 132, 137, 143, 149, 192, 225, 231, 235,
+    246, 250, 251, 253, 254, 261, 263, 264, 265, 280, 281, 283, 284, 285, 286, 290, 291, 292, 296, 330, 339, 340,
+    360, 361, 371, 372, 375, 380, 395, 397, 435, 441, 514, 10001, 10002, 12900, 12901, 12904, 12918, 12920,
 )
 # fmt: on
 
@@ -81,7 +82,7 @@ def streams(identity: Identity, now_s: Callable[[], float], unix_s: Callable[[],
         (dialect.MAVLINK_MSG_ID_ALTITUDE, 10.0, motion.altitude, LOOP_HZ),
         (dialect.MAVLINK_MSG_ID_ODOMETRY, 30.0, motion.odometry, ESTIMATOR_HZ),
         (dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, 50.0, motion.attitude_quaternion, LOOP_HZ),
-        (dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET, 10.0, motion.attitude_target, LOOP_HZ),
+        (dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET, 10.0, motion.AttitudeTargets(), LOOP_HZ),
         (dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 50.0, motion.global_position, ESTIMATOR_HZ),
         (dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED, 10.0, motion.position_target_local, LOOP_HZ),
         (dialect.MAVLINK_MSG_ID_VFR_HUD, 10.0, motion.vfr_hud, ESTIMATOR_HZ),

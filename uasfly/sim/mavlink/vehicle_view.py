@@ -8,10 +8,13 @@ from dataclasses import dataclass
 from uasfly.frames import euler_from_quaternion, swap_enu_ned, swap_flu_frd, swap_quaternion_enu_ned
 from uasfly.messages import Array, FlightMode, HealthSample
 from uasfly.sim.commander import READY_S
+from uasfly.sim.estimate import PROBATION_S
 from uasfly.sim.mavlink.vehicle_protocol import Vehicle
 
 DEFAULT_OFFBOARD_LOSS_S = 1.0
 DEFAULT_CRITICAL_CHARGE = 0.07
+GNSS_FIX = 3
+GNSS_STOP_S = 7.0  # without GNSS until the estimator counts on it no more (recording: 7.0 to 7.2 s)
 # modes that PX4 does not arm in; Position needs a remote control
 CANNOT_START = frozenset(
     {FlightMode.LAND, FlightMode.RETURN, FlightMode.DESCEND, FlightMode.POSITION, FlightMode.OTHER}
@@ -61,6 +64,8 @@ class VehicleView:
         intended_mode: mode that was last asked for; PX4 is in failsafe when it flies another one.
         last_setpoint_s: vehicle time of the last attitude setpoint, -inf before the first.
         home: see `Home`; moves whenever the vehicle is armed.
+        position_trusted: the commander relies on the position.
+        gnss_used: the estimator counts on GNSS. gnss_present: the commander does.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
@@ -71,6 +76,9 @@ class VehicleView:
         self._motion: Motion | None = None
         self._health: HealthSample | None = None
         self.home = self._here()
+        self._position_lost_s = self._fix_s = -math.inf
+        self.position_trusted = self.gnss_used = self.gnss_present = False
+        self._judge_position()
 
     def refresh(self) -> None:
         """Forget what was read: call it after the vehicle has moved on or has been commanded."""
@@ -84,6 +92,7 @@ class VehicleView:
             self.intended_mode = FlightMode.HOLD  # a finished take-off is a wish fulfilled
         if not self.state.armed:
             self.intended_mode = self.state.mode
+        self._judge_position()
 
     @property
     def time_s(self) -> float:
@@ -130,12 +139,25 @@ class VehicleView:
         mode = self.state.mode
         startable = mode not in CANNOT_START and (mode is not FlightMode.OFFBOARD or self.setpoints_arrive)
         charged = not self.vehicle.battery().remaining < self.parameter("BAT_CRIT_THR", DEFAULT_CRITICAL_CHARGE)
-        return startable and charged and self.time_s >= READY_S and self.health.position_ok
+        return startable and charged and self.time_s >= READY_S and self.position_trusted
 
     def parameter(self, name: str, default: float) -> float:
         """Value of a PX4 parameter, the default where the vehicle has none of this name."""
         found = self.vehicle.parameters.get(name)
         return default if found is None else found[1]
+
+    def _judge_position(self) -> None:
+        """Work out what follows position and GNSS with a delay."""
+        health, now = self.health, self.time_s
+        if not health.position_ok:
+            self._position_lost_s = now
+        self.position_trusted = health.position_ok and now - self._position_lost_s >= PROBATION_S
+        if health.gnss_fix >= GNSS_FIX:
+            self._fix_s = now
+            self.gnss_used |= health.position_ok
+            self.gnss_present |= self.position_trusted
+        elif not 0.0 <= now - self._fix_s <= GNSS_STOP_S:
+            self.gnss_used = self.gnss_present = False
 
     def _here(self) -> Home:
         motion = self.motion
