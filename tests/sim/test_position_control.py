@@ -129,3 +129,12 @@ def test_a_speed_limit_below_zero_is_none() -> None:
     control = controller(MPC_XY_VEL_MAX=-1.0)
     answer = control.update(MotionSetpoint((1.0, 2.0, 3.0), STILL, 0.0), (1.0, 2.0, 3.0), STILL, 0.34, WIDE)
     assert answer.thrust == pytest.approx(0.34)
+
+
+@pytest.mark.parametrize("hover", [0.0, -1.0, 1e-30])
+def test_a_senseless_hover_thrust_divides_nothing(hover: float) -> None:
+    """MPC_THR_HOVER may be set to anything."""
+    control = controller()
+    for _ in range(500):
+        answer = control.update(MotionSetpoint((5.0, 3.0, 1.0), STILL, 0.0), STILL, STILL, hover, WIDE)
+        assert np.isfinite((*answer.attitude, answer.thrust)).all()

@@ -144,9 +144,11 @@ class PositionControl:
 
         As PX4's PositionControl::updateHoverThrust: T = hover (1 + a / g) is the same before and after.
         """
+        hover_thrust = max(hover_thrust, _SMALLEST_THRUST)  # MPC_THR_HOVER may be anything
         if self._hover_thrust is not None:
             specific_force = self._last_acceleration_z + GRAVITY_M_S2
-            self._integral[2] += specific_force * (self._hover_thrust / hover_thrust - 1.0)
+            value = self._integral[2] + specific_force * (self._hover_thrust / hover_thrust - 1.0)
+            self._integral[2] = min(_LARGEST_INTEGRAL, max(-_LARGEST_INTEGRAL, value))
         self._hover_thrust = hover_thrust
 
     def _velocity_error(self, setpoint: MotionSetpoint, position: Vector, velocity: Vector) -> Vector:
