@@ -7,6 +7,7 @@ import pytest
 from tests.sim.plants import PLANTS, k_thrust, plant
 from uasfly.errors import FileError
 from uasfly.files import shipped_names
+from uasfly.sim.battery import Battery
 
 
 def test_all_plants_are_shipped() -> None:
@@ -64,3 +65,11 @@ def test_a_plant_that_cannot_be_is_refused(field: str, value: object, said: str)
     """A file whose figures contradict each other is refused with the field's name."""
     with pytest.raises(FileError, match=said):
         plant("f550", {field: value})
+
+
+def test_a_resistance_of_next_to_nothing_is_none() -> None:
+    """The smaller root of the motor's equation cancels to zero there, and the battery divides by it."""
+    tiny = plant("f550", {"rotors.motor_resistance_ohm": 1e-30})
+    none = plant("f550", {"rotors.motor_resistance_ohm": 0.0})
+    assert tiny.motor_speed_constant == none.motor_speed_constant
+    assert Battery(tiny).full_speed_rad_s() > 0.0

@@ -200,7 +200,7 @@ class Plant(FileModel):
         """
         rotors, voltage, speed = self.rotors, self.battery.reference_voltage_v, self.rotors.full_speed_rad_s
         resistive = rotors.motor_resistance_ohm * rotors.torque_per_thrust_m * rotors.static_thrust_n(speed)
-        if resistive == 0.0:
+        if resistive * speed < 1e-12 * voltage * voltage:  # as good as none, and the difference below would be zero
             return speed / voltage
         discriminant = voltage * voltage - 4.0 * resistive * speed
         return None if discriminant < 0.0 else (voltage - math.sqrt(discriminant)) / (2.0 * resistive)
