@@ -51,7 +51,8 @@ def printable(text: str) -> str:
 
 
 def shortened(text: str, length: int = LONGEST_NAME) -> str:
-    """The beginning of a text that is too long to be shown."""
+    """A name on one line, or the beginning of one that is too long to be shown."""
+    text = text.replace("\n", "\\n")
     return text if len(text) <= length else text[: length - 3] + "..."
 
 

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from uasfly.errors import MOST_PROBLEMS, shortened
+from uasfly.errors import LONGEST_NAME, MOST_PROBLEMS
 from uasfly.yaml_text import DataPath, dotted
 
 _COUNT = ("no", "one", "two", "three", "four", "five", "six")
@@ -52,7 +52,8 @@ def found(value: object) -> str:
         return f"{value:g} (not a finite number)"
     if isinstance(value, (int, float)):
         return repr(value)[:40]
-    return repr(shortened(str(value)))
+    text = str(value)
+    return repr(text if len(text) <= LONGEST_NAME else text[: LONGEST_NAME - 3] + "...")
 
 
 def describe_problems(error: ValidationError, model: type[BaseModel], where: Callable[[DataPath], str]) -> list[str]:

@@ -134,5 +134,6 @@ def test_wrong_syntax_says_how_to_mend_it(text, mend):
 def test_names_of_any_length_are_shown_by_their_beginning():
     """A key, a tag or an anchor may be as long as the file."""
     assert dotted(("x" * 5000, 1)) == "x" * 57 + "...[1]"
+    assert dotted(("x\ny",)) == "x\\ny"
     for text in (f"&{'a' * 5000} b", f"!{'t' * 5000} b", f"*{'a' * 5000}"):
         assert len(problems(text)[0]) < 300
