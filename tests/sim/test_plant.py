@@ -72,4 +72,6 @@ def test_a_resistance_of_next_to_nothing_is_none() -> None:
     tiny = plant("f550", {"rotors.motor_resistance_ohm": 1e-30})
     none = plant("f550", {"rotors.motor_resistance_ohm": 0.0})
     assert tiny.motor_speed_constant == none.motor_speed_constant
-    assert Battery(tiny).full_speed_rad_s() > 0.0
+    battery = Battery(tiny)
+    battery.draw([0.0] * tiny.rotors.count, 0.04)
+    assert battery.full_speed_rad_s() > 0.0
