@@ -12,8 +12,10 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 GRAVITY_M_S2 = 9.80665
 
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+# No quantity that people write down lies beyond these, and no product of a few of them overflows.
+SMALLEST, LARGEST = 1e-9, 1e9
+Positive = Annotated[float, Field(gt=SMALLEST, le=LARGEST, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST, allow_inf_nan=False)]
 Triple = tuple[NonNegative, NonNegative, NonNegative]
 
 
@@ -33,7 +35,9 @@ class FirstOrder(FileModel):
 class ModelParameters(FileModel):
     """Identified model (Kalaitzakis 2023, eq. 1 and 2)."""
 
-    k_thrust_m_s2: Annotated[float, Field(gt=GRAVITY_M_S2, description="thrust acceleration at full thrust command")]
+    k_thrust_m_s2: Annotated[
+        float, Field(gt=GRAVITY_M_S2, le=1000.0, description="thrust acceleration at full thrust command")
+    ]
     drag_1_s: Annotated[Triple, Field(description="linear drag x, y, z, positive: acceleration = -drag * velocity")]
     roll: FirstOrder
     pitch: FirstOrder
@@ -78,7 +82,7 @@ class Weights(FileModel):
     roll: Positive
     pitch: Positive
     thrust: Positive
-    terminal: Annotated[float, Field(ge=0.0, description="terminal weight as a multiple of the stage weights")]
+    terminal: Annotated[float, Field(ge=0.0, le=1e6, description="terminal weight as a multiple of the stage weights")]
     move: Annotated[
         float,
         Field(ge=0.0, le=20.0, description="weight on the first input's step from the last command, as a multiple"),

@@ -7,10 +7,16 @@ import traceback
 from pathlib import Path
 
 DEBUG_VARIABLE = "UASFLY_DEBUG"
+MOST_PROBLEMS = 30  # a file with more is not mended by reading them all
+LONGEST_NAME = 60
 
 
 class UasflyError(Exception):
     """Base of every error that uasfly raises on purpose; the command line prints it and exits with code 2."""
+
+    def __str__(self) -> str:
+        """The text, safe to be printed: what a file or a flag holds may stand in it."""
+        return printable(super().__str__())
 
 
 class FileError(UasflyError):
@@ -23,8 +29,10 @@ class FileError(UasflyError):
 
     def __init__(self, path: str, problems: list[str]) -> None:
         self.path = path
-        self.problems = problems
-        super().__init__("\n".join(f"{path}: {problem}" for problem in problems))
+        self.problems = [printable(problem) for problem in problems[:MOST_PROBLEMS]]
+        if len(problems) > MOST_PROBLEMS:
+            self.problems.append(f"and more than {MOST_PROBLEMS} problems in all; mend these first")
+        super().__init__("\n".join(f"{path}: {problem}" for problem in self.problems))
 
 
 class LinkError(UasflyError):
@@ -33,6 +41,19 @@ class LinkError(UasflyError):
 
 class CommandRefusedError(UasflyError):
     """The vehicle refused a command (arm, mode change, ...) or did not answer it."""
+
+
+def printable(text: str) -> str:
+    """A text without characters that move a terminal's cursor, colour it or hide; they are shown as escapes."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+
+
+def shortened(text: str, length: int = LONGEST_NAME) -> str:
+    """A name on one line, or the beginning of one that is too long to be shown."""
+    text = text.replace("\n", "\\n")
+    return text if len(text) <= length else text[: length - 3] + "..."
 
 
 def describe_error(error: BaseException) -> str:

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from uasfly.errors import LONGEST_NAME, MOST_PROBLEMS
 from uasfly.yaml_text import DataPath, dotted
 
 _COUNT = ("no", "one", "two", "three", "four", "five", "six")
@@ -52,7 +53,7 @@ def found(value: object) -> str:
     if isinstance(value, (int, float)):
         return repr(value)[:40]
     text = str(value)
-    return repr(text if len(text) <= 60 else text[:57] + "...")
+    return repr(text if len(text) <= LONGEST_NAME else text[: LONGEST_NAME - 3] + "...")
 
 
 def describe_problems(error: ValidationError, model: type[BaseModel], where: Callable[[DataPath], str]) -> list[str]:
@@ -67,6 +68,8 @@ def describe_problems(error: ValidationError, model: type[BaseModel], where: Cal
     for details in error.errors(include_url=False):
         if details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]:
             continue  # pydantic counts the valid items only; the invalid ones have errors of their own
+        if len(problems) > MOST_PROBLEMS:
+            break  # no more are shown, and looking for a like name takes its time
         path, text = _describe(details, model)
         problems.setdefault(path, f"{where(path)}{text}")
     return list(dict.fromkeys(problems.values()))
@@ -93,7 +96,7 @@ def _describe(details: ErrorDetails, model: type[BaseModel]) -> tuple[DataPath, 
         tag, value = str(context["discriminator"]).strip("'"), str(context["tag"])
         known = place.tags(tag)
         expected = f"expected one of {', '.join(known)}"
-        return (*path, tag), f"{dotted((*path, tag))}: {expected}, found {value!r}{_mend(value, known)}"
+        return (*path, tag), f"{dotted((*path, tag))}: {expected}, found {found(value)}{_mend(value, known)}"
     if kind in ("value_error", "assertion_error"):
         return path, f"{field}: {context['error']}"
     value, mend = details["input"], ""
@@ -204,12 +207,17 @@ def describe_type(annotation: object, plural: bool = False) -> str:
     if origin is Literal:
         return f"{'' if plural else 'one of '}{', '.join(str(value) for value in arguments)}"
     if origin in (tuple, list) and arguments:
-        item = describe_type(arguments[0], plural=True)
+        alike = all(argument in (arguments[0], Ellipsis) for argument in arguments)
+        item = describe_type(arguments[0] if alike else _without_bounds(arguments[0]), plural=True)
         count = "" if origin is list or Ellipsis in arguments else f"{_count(len(arguments))} "
         return f"{'lists' if plural else 'a list'} of {count}{item}"
     if _is_model(annotation) or origin is dict:
         return "blocks of fields" if plural else "a block of fields"
     return _NAMES[annotation][plural] if annotation in _NAMES else ""
+
+
+def _without_bounds(annotation: Any) -> Any:
+    return get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
 
 
 def _count(number: int) -> str:

@@ -14,17 +14,17 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from uasfly.errors import FileError
+from uasfly.errors import FileError, shortened
 from uasfly.file_problems import describe_problems, found, nearest
 from uasfly.yaml_text import DataPath, Document, dotted, parse_yaml
 
 M = TypeVar("M", bound=BaseModel)
 Kind = Literal["airframe", "mission", "scenario", "plant"]
 
-MAX_BYTES = 256 * 1024  # the YAML reader takes some seconds for this much; a thousand waypoints need a tenth of it
+MAX_BYTES = 96 * 1024  # the YAML reader takes a second for this much; a thousand waypoints need half of it
 SUFFIXES = (".yaml", ".yml")
 _PACKAGE = Path(__file__).parent
-_PATH_PART = re.compile(r"\.?([^.\[\]]+)|\[(\d+)\]")
+_PATH_PART = re.compile(r"\.?([^.\[\]]+)|\[([0-9]{1,6})\]")
 _NO_OVERRIDES: Mapping[str, object] = MappingProxyType({})
 
 
@@ -70,7 +70,7 @@ def find_file(kind: Kind, name: str, folders: Sequence[Path] | None = None) -> P
         FileError: there is no such file; it lists the names there are.
     """
     plain = bool(name) and "/" not in name and "\\" not in name
-    if name and _is_file(Path(name)):
+    if name and is_file(Path(name)):
         return Path(name)
     shelves = list(folders) if folders is not None else [shipped_folder(kind)]
     shipped = {file.stem: file for shelf in reversed(shelves) for file in _yaml_files(shelf)}
@@ -87,7 +87,7 @@ def find_file(kind: Kind, name: str, folders: Sequence[Path] | None = None) -> P
         problem = f"there is no {kind} of this name, and no such file"
         problem += f"; did you mean {match_name}?" if match_name else ""
     else:
-        problem = "it is a directory; expected a file" if _is_directory(Path(name)) else "there is no such file"
+        problem = "it is a directory; expected a file" if is_directory(Path(name)) else "there is no such file"
     raise FileError(name or "''", [f"{problem} (shipped {kind}s: {', '.join(names) or 'none'})"])
 
 
@@ -117,7 +117,7 @@ def parse_overrides(assignments: Sequence[str]) -> dict[str, object]:
         if not equals or not key:
             raise FileError("--set", [f"expected key=value (limits.tilt_deg=25), found {found(assignment)}"])
         _split_key(key)
-        source = f"--set {key}"
+        source = f"--set {shortened(key)}"
         overrides[key] = parse_yaml(value, source).data if value.strip() else None
     return overrides
 
@@ -169,7 +169,7 @@ def _split_key(key: str) -> DataPath:
         match = _PATH_PART.match(key, position)
         if match is None or (position == 0) == key.startswith((".", "["), position):
             expected = "expected names joined by dots, list indices in brackets (legs[0].radius_m)"
-            raise FileError("--set", [f"{key} is not the path of a field; {expected}"])
+            raise FileError("--set", [f"{shortened(key)} is not the path of a field; {expected}"])
         name, index = match.groups()
         path.append(name if index is None else int(index))
         position = match.end()
@@ -197,7 +197,7 @@ def _apply_overrides(
                     place[part] = value
                 place = place[part]
             else:
-                raise FileError(source, [f"--set {key}: {_misfit(path[:depth], part, place)}"])
+                raise FileError(source, [f"--set {shortened(key)}: {_misfit(path[:depth], part, place)}"])
         made = {path[:depth] for depth in range(1, len(path)) if path[:depth] not in lines}
         changed |= made | {path}
     return changed
@@ -228,14 +228,16 @@ def _yaml_files(folder: Path) -> list[Path]:
     return sorted(file for file in folder.glob("*") if file.suffix in SUFFIXES and file.is_file())
 
 
-def _is_file(path: Path) -> bool:
+def is_file(path: Path) -> bool:
+    """Whether there is a file; False for a name that no file can have."""
     try:
         return path.is_file()
     except (OSError, ValueError):
         return False
 
 
-def _is_directory(path: Path) -> bool:
+def is_directory(path: Path) -> bool:
+    """Whether there is a directory; False for a name that none can have."""
     try:
         return path.is_dir()
     except (OSError, ValueError):

@@ -14,17 +14,18 @@ from pydantic import Field, model_validator
 from uasfly.airframe import FileModel
 from uasfly.monitor_settings import MonitorSettings
 
+LEAST = 1e-4  # of metres, seconds, turns, m/s: what is less is a slip, and its reciprocal nothing to fly by
 Coordinate = Annotated[float, Field(ge=-10_000.0, le=10_000.0, allow_inf_nan=False)]
 Point = tuple[Coordinate, Coordinate, Coordinate]
 GroundPoint = tuple[Coordinate, Coordinate]
-Length = Annotated[float, Field(gt=0.0, le=10_000.0, allow_inf_nan=False)]
-Duration = Annotated[float, Field(gt=0.0, le=7200.0, allow_inf_nan=False)]
+Length = Annotated[float, Field(gt=LEAST, le=10_000.0, allow_inf_nan=False)]
+Duration = Annotated[float, Field(gt=LEAST, le=7200.0, allow_inf_nan=False)]
 Pause = Annotated[float, Field(ge=0.0, le=7200.0, allow_inf_nan=False)]
-Speed = Annotated[float, Field(gt=0.0, le=50.0, allow_inf_nan=False)]
-Acceleration = Annotated[float, Field(gt=0.0, le=50.0, allow_inf_nan=False)]
-Jerk = Annotated[float, Field(gt=0.0, le=1000.0, allow_inf_nan=False)]
+Speed = Annotated[float, Field(gt=LEAST, le=50.0, allow_inf_nan=False)]
+Acceleration = Annotated[float, Field(gt=LEAST, le=50.0, allow_inf_nan=False)]
+Jerk = Annotated[float, Field(gt=LEAST, le=1000.0, allow_inf_nan=False)]
 Wind = Annotated[float, Field(gt=0.0, le=40.0, allow_inf_nan=False)]
-Turns = Annotated[float, Field(gt=0.0, le=1000.0, allow_inf_nan=False)]
+Turns = Annotated[float, Field(gt=LEAST, le=1000.0, allow_inf_nan=False)]
 Angle = Annotated[float, Field(ge=-720.0, le=720.0, allow_inf_nan=False)]
 Direction = Literal["counterclockwise", "clockwise"]
 

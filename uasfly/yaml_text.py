@@ -26,13 +26,14 @@ from ruamel.yaml.events import (
 )
 from ruamel.yaml.reader import ReaderError
 
-from uasfly.errors import FileError
+from uasfly.errors import FileError, shortened
 
 DataPath = tuple[str | int, ...]
 
 MAX_DEPTH = 32
 MAX_DIGITS = 300
 
+_BREAK = re.compile("[\n\r\x85\u2028\u2029]")  # what the reader counts as the end of a line
 _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _INFINITY = re.compile(r"([-+]?)\.(?:inf|Inf|INF)")
@@ -42,6 +43,18 @@ _WORDS: Mapping[str, object] = {
     **dict.fromkeys(("false", "False", "FALSE"), False),
     **dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan")),
 }
+
+
+_MENDS = (
+    ("<stream end>", "a bracket, brace or quote before it is not closed"),
+    ("end of stream", "a quote before it is not closed"),
+    ("<block end>", "indent it like the lines that it belongs to"),
+    ("<document start>", "it does not go on from what stands before it: look at indentation and brackets"),
+    ("mapping values are not allowed", "indent it like the lines that it belongs to, or put the text in quotes"),
+    ("could not find expected ':'", "expected a field and its value (name: value)"),
+    ("cannot start any token", "put the text in quotes"),
+    ("',' or", "put a comma between the items, or close the bracket"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +83,8 @@ def dotted(path: DataPath) -> str:
         if isinstance(part, int):
             text += f"[{part}]"
         else:
-            text += f".{part}" if text else part
+            name = shortened(part)
+            text += f".{name}" if text else name
     return text
 
 
@@ -90,8 +104,8 @@ def parse_yaml(text: str, source: str) -> Document:
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-        tab = mark is not None and "\t" in text.split("\n")[mark.line][: mark.column + 1]
-        mend = "; indent with spaces, not tabs" if tab else ""
+        tab = mark is not None and "\t" in _BREAK.split(text[: mark.index + 1])[-1]
+        mend = "; indent with spaces, not tabs" if tab else _mend(error.problem or "")
         context = f" {error.context}" if error.context else ""
         problem = f"{where}not valid YAML: {error.problem or 'cannot be read'}{context}{mend}"
     except ReaderError as error:
@@ -100,6 +114,14 @@ def parse_yaml(text: str, source: str) -> Document:
     except YAMLError as error:
         problem = f"not valid YAML: {error}"
     raise FileError(source, [problem]) from None
+
+
+def _mend(problem: str) -> str:
+    """What mostly is to be done about a problem of the parser, which knows the grammar only."""
+    for sign, mend in _MENDS:
+        if sign in problem:
+            return f"; {mend}"
+    return ""
 
 
 @dataclass(slots=True)
@@ -132,7 +154,7 @@ class _Builder:
                 if event.version or event.tags:
                     self._stop(event, "a %-directive stands before the document; expected none (remove it)")
             elif isinstance(event, AliasEvent):
-                self._stop(event, f"alias *{event.anchor}: aliases are not used here; write the value out")
+                self._stop(event, f"alias *{shortened(event.anchor)}: aliases are not used here; write the value out")
             elif isinstance(event, NodeEvent):
                 self._node(event)
             elif isinstance(event, (MappingEndEvent, SequenceEndEvent)):
@@ -150,10 +172,10 @@ class _Builder:
 
     def _node(self, event: NodeEvent) -> None:
         if event.anchor is not None:
-            self._stop(event, f"anchor &{event.anchor}: anchors are not used here; write the value out")
+            self._stop(event, f"anchor &{shortened(event.anchor)}: anchors are not used here; write the value out")
         tag = getattr(event, "tag", None)
         if tag is not None:
-            self._stop(event, f"tag {tag}: tags are not used here; write the plain value")
+            self._stop(event, f"tag {shortened(str(tag))}: tags are not used here; write the plain value")
         top = self._stack[-1] if self._stack else None
         if top is not None and isinstance(top.value, dict) and top.key is None:
             self._key(event, top, top.value)

@@ -138,3 +138,18 @@ def test_an_unknown_kind_has_no_schema() -> None:
     """The error lists the kinds."""
     with pytest.raises(UasflyError, match="expected one of mission, airframe, scenario, plant, found 'aeroplane'"):
         schema_of("aeroplane")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("x" * 5000, "no such file"), ("a\x00b", "no such file"), ("/", "directory")]
+)
+def test_a_name_that_no_file_can_have_is_told(name: str, said: str) -> None:
+    """The system refuses to look for some names at all."""
+    (finding,) = check_files([name], "f550")
+    assert finding.severity == "error"
+    assert said in finding.message
+
+
+def test_a_finding_cannot_reach_the_terminal() -> None:
+    """The name of a file is shown with its escapes."""
+    assert check_files(["\x1b[2J"], "f550")[0].text().startswith("\\x1b[2J: error")

@@ -260,3 +260,44 @@ def test_a_schema_says_which_draft_it_is_and_refuses_unknown_fields(model):
     assert schema["title"] == f"uasfly {model.__name__.lower()} file"
     assert schema["additionalProperties"] is False
     assert "name" in schema["required"]
+
+
+def test_a_file_of_nothing_but_mistakes_names_the_first_of_them(write):
+    """Looking for a like name takes its time, and nobody reads a thousand problems."""
+    text = MISSION + "".join(f"raduis_{number}: 1\n" for number in range(3000))
+    found = problems(write(text))
+    assert found[0].startswith("line 12: raduis_0 is not a known field")
+    assert len(found) == 31
+    assert found[-1] == "and more than 30 problems in all; mend these first"
+
+
+def test_an_error_cannot_reach_the_terminal(write):
+    """What a file holds is shown with its escapes, not carried out."""
+    (problem,) = problems(write(MISSION + '"\\e[2J\\u202e": 1\n'))
+    assert "\\x1b[2J\\u202e is not a known field" in problem
+
+
+@pytest.mark.parametrize("key", [f"legs[{'9' * 5000}]", "legs[1234567]", "legs[²]"])
+def test_an_index_of_any_length_is_no_index(key):
+    """Python refuses to read whole numbers of thousands of digits."""
+    with pytest.raises(FileError, match="is not the path of a field") as caught:
+        parse_overrides([f"{key}=1"])
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize("value", ["1.0e-300", "5.0e-324", "0.00005"])
+@pytest.mark.parametrize("field", ["duration_s: 10", "radius_m: 1", "speed_m_s: 0.5"])
+def test_a_figure_too_small_to_fly_by_is_refused(write, field, value):
+    """Its reciprocal overflows; it was a slip."""
+    name = field.split(":")[0]
+    (problem,) = problems(write(MISSION.replace(field, f"{name}: {value}")))
+    assert "expected a number, above 0.0001" in problem
+
+
+@pytest.mark.parametrize(
+    "assignment", ["model.k_thrust_m_s2=1e200", "controller.weights.terminal=.inf", "mass_kg=1e300"]
+)
+def test_a_figure_too_large_to_reckon_with_is_refused(assignment):
+    """Its square overflows; k_thrust_m_s2 did so in `uasfly check`."""
+    with pytest.raises(FileError, match="not above"):
+        load_file(find_file("airframe", "f550"), Airframe, parse_overrides([assignment]))

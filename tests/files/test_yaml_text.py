@@ -105,3 +105,35 @@ def test_any_text_gives_data_or_a_file_error(text):
 def test_paths_are_written_as_people_write_them():
     """Names are joined by dots, indices stand in brackets."""
     assert dotted(("legs", 2, "points", 0, "position_m")) == "legs[2].points[0].position_m"
+
+
+@pytest.mark.parametrize("line_break", ["\x85", "\u2028", "\u2029", "\r"])
+def test_a_problem_behind_an_odd_line_break_has_its_place(line_break):
+    """The reader may count more lines than there are line feeds; looking for tabs in the last must not fail."""
+    (problem,) = problems(f"a: 1{line_break * 3}b: [1, 2")
+    assert problem.startswith("line 4, column 9" if line_break == "\r" else "line 1, column 9")
+
+
+@pytest.mark.parametrize(
+    ("text", "mend"),
+    [
+        ("a: b: c\n", "indent it like the lines"),
+        ("a:\n  - 1\n b: 2\n", "indent it like the lines"),
+        ("a: {b: 1\n", "is not closed"),
+        ("a: 'b\n", "is not closed"),
+        ("a: @b\n", "put the text in quotes"),
+        ("- a\nb: 1\n", "indent it like the lines"),
+    ],
+)
+def test_wrong_syntax_says_how_to_mend_it(text, mend):
+    """The parser names its grammar; a person wants to know what to do."""
+    (problem,) = problems(text)
+    assert mend in problem
+
+
+def test_names_of_any_length_are_shown_by_their_beginning():
+    """A key, a tag or an anchor may be as long as the file."""
+    assert dotted(("x" * 5000, 1)) == "x" * 57 + "...[1]"
+    assert dotted(("x\ny",)) == "x\\ny"
+    for text in (f"&{'a' * 5000} b", f"!{'t' * 5000} b", f"*{'a' * 5000}"):
+        assert len(problems(text)[0]) < 300

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -80,3 +81,12 @@ def test_a_voltage_that_is_none_is_unknown(voltage_v: float, known: bool) -> Non
     view = VehicleView()
     view.update((BatterySample(1.0, voltage_v, math.nan),))
     assert view.voltage_v == (voltage_v if known else None)
+
+
+def test_infinities_of_both_signs_are_no_velocity() -> None:
+    """Their sum is not a number, and numpy would say so in the terminal."""
+    view = VehicleView()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        view.update((OdometrySample(1.0, ZERO, np.array((math.inf, -math.inf, 0.0)), LEVEL, ZERO),))
+    assert view.odometry is None

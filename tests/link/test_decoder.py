@@ -305,3 +305,36 @@ def test_px4s_own_recording_decodes_without_a_loss() -> None:
     assert (state.armed, state.in_air) == (True, True)
     health = [sample for sample in samples if isinstance(sample, HealthSample)][-1]
     assert (health.position_ok, health.gnss_fix) == (True, 3)
+
+
+@pytest.mark.parametrize("huge", ["1e400", "1" + "0" * 400, "-1e400"])
+@pytest.mark.parametrize("field", ["x", "vx", "rollspeed", "time_usec"])
+def test_a_number_beyond_all_bounds_is_dropped(field: str, huge: str) -> None:
+    """JSON can say what no float holds: such a message is counted, and nothing else happens."""
+    decoder = make()
+    text = json.dumps(odometry(**{field: "HERE"})).replace('"HERE"', huge)
+    sample = decoder.decode("ODOMETRY", text, 1.0)
+    assert sample is None or (field == "time_usec" and sample.time_s == 1.0)
+    assert decoder.dropped["ODOMETRY"] == (sample is None)
+
+
+@pytest.mark.parametrize("sequence", [256, 10**9, -1])
+def test_a_chunk_that_no_text_has_is_dropped(sequence: int) -> None:
+    """The missing ones before it are not made up: that would take all memory."""
+    decoder = make()
+    assert decoder.decode("STATUSTEXT", status_text("x" * 50, 7, sequence), 1.0) is None
+    assert decoder.dropped["STATUSTEXT"] == 1
+    assert decoder.overdue_texts(9.0) == []
+
+
+def test_a_text_without_end_is_given_out_at_its_longest() -> None:
+    """A vehicle that never ends its text must not fill the memory."""
+    decoder = make()
+    samples = [decoder.decode("STATUSTEXT", status_text("x" * 50, 7, n % 256), 1.0) for n in range(600)]
+    assert sum(sample is not None for sample in samples) == 2
+
+
+def test_a_text_cannot_reach_the_terminal() -> None:
+    """Escapes and other characters that do not show become spaces."""
+    sample = make().decode("STATUSTEXT", status_text("low\x1b[2J battery\t\u202e!"), 1.0)
+    assert sample == TextSample(1.0, 4, "low [2J battery !")

@@ -162,3 +162,11 @@ async def test_a_closed_link_is_quiet_and_gives_its_port_back() -> None:
             link.send_text(6, "late")
         async with await MavsdkLink.connect(f"udpin://127.0.0.1:{port}") as again:
             assert again.system_id == 1
+
+
+async def test_a_text_that_is_no_utf_8_stays_out_of_the_terminal(pair: Pair, capfd: pytest.CaptureFixture[str]) -> None:
+    """MAVSDK logs every status text; its Python wrapper fails at other bytes and lets them through to the terminal."""
+    link, vehicle = pair
+    vehicle.send(mavlink.MAVLink_statustext_message(4, b"caf\xe9 \xff\x1b[31m"))
+    await until(link, lambda got: any(text.startswith("caf") for text in texts(got)))
+    assert capfd.readouterr() == ("", "")

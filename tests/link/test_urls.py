@@ -56,6 +56,9 @@ def test_friendly_forms_become_what_mavsdk_understands(text: str, mavsdk: str) -
         ("serial:///dev/ttyUSB0", "baud rate"),
         ("/dev/ttyUSB0:fast", "baud rate must be a number"),
         ("udpin://0.0.0.0:14540:1", "none of the accepted forms"),
+        ("udpin://0.0.0.0:²", "found '²'"),
+        ("udpin://0.0.0.0:" + "9" * 5000, "must be a number in 1..65535"),
+        ("/dev/ttyUSB0:²", "baud rate must be a number"),
     ],
 )
 def test_a_wrong_url_names_the_fault_and_the_accepted_forms(text: str, problem: str) -> None:

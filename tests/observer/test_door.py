@@ -81,3 +81,18 @@ def test_a_sighting_whose_covariance_is_not_positive_definite_stays_outside() ->
     covariance[2, 2] = 0.0
     assert checked_sighting(dataclasses.replace(SIGHTING, covariance=covariance)) is None
     assert checked_sighting(SIGHTING) is not None
+
+
+@pytest.mark.parametrize("rate", [50.0, 21196.0, 1e6])
+def test_a_turn_that_no_gyro_can_measure_is_left_out(rate: float) -> None:
+    """No gate holds it back: the filter turns by it, and one such sample threw the estimate beyond all bounds."""
+    odometry = checked_odometry(dataclasses.replace(SAMPLE, angular_rate_in_body=np.array((0.0, rate, 0.0))))
+    assert odometry is not None
+    assert odometry.rate is None
+
+
+def test_a_speed_that_no_vehicle_has_is_left_out() -> None:
+    """The first sample meets no gate."""
+    odometry = checked_odometry(dataclasses.replace(SAMPLE, velocity_in_world=np.array((0.0, 0.0, 2000.0))))
+    assert odometry is not None
+    assert odometry.use == (1.0, 1.0, 0.0)

@@ -7,6 +7,7 @@ import pytest
 from tests.sim.plants import PLANTS, k_thrust, plant
 from uasfly.errors import FileError
 from uasfly.files import shipped_names
+from uasfly.sim.battery import Battery
 
 
 def test_all_plants_are_shipped() -> None:
@@ -53,9 +54,24 @@ def test_neighbours_on_the_hexacopter_spin_against_each_other() -> None:
         ("parameters.MC_ROL_P", 1.0, "MC_ROL_P"),
         ("battery.open_circuit", [[0.0, 12.0], [0.5, 13.0]], "charge must ascend from 0 to 1"),
         ("inertia_kg_m2", [0.02, 0.0, 0.02], "inertia_kg_m2"),
+        ("rotors.full_speed_rad_s", 1e200, "full_speed_rad_s: expected a number.*not above"),
+        ("rotors.torque_per_thrust_m", 0.0, "torque_per_thrust_m: expected a number, above"),
+        ("rotors.arm_length_m", 1e9, "arm_length_m: expected a number"),
+        ("parameters.MC_ROLL_P", float("nan"), "MC_ROLL_P: expected a number"),
+        ("parameters.MC_ROL_P", 1.0, "did you mean MC_ROLL_P"),
     ],
 )
 def test_a_plant_that_cannot_be_is_refused(field: str, value: object, said: str) -> None:
     """A file whose figures contradict each other is refused with the field's name."""
     with pytest.raises(FileError, match=said):
         plant("f550", {field: value})
+
+
+def test_a_resistance_of_next_to_nothing_is_none() -> None:
+    """The smaller root of the motor's equation cancels to zero there, and the battery divides by it."""
+    tiny = plant("f550", {"rotors.motor_resistance_ohm": 1e-30})
+    none = plant("f550", {"rotors.motor_resistance_ohm": 0.0})
+    assert tiny.motor_speed_constant == none.motor_speed_constant
+    battery = Battery(tiny)
+    battery.draw([0.0] * tiny.rotors.count, 0.04)
+    assert battery.full_speed_rad_s() > 0.0

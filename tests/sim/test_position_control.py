@@ -114,3 +114,27 @@ def test_hover_thrust_is_learned() -> None:
     hover.learn(0.02, 1.0, 0.0, 0.04)
     hover.learn(0.4, 1.0, -9.0, 0.04)
     assert hover.value == pytest.approx(0.299, abs=1e-3)
+
+
+def test_a_senseless_gain_carries_the_integral_nowhere() -> None:
+    """PX4 takes any finite parameter; an integral gain of the wrong sign and size must not end in infinity."""
+    control = controller(MPC_XY_VEL_I_ACC=-1e6, MPC_XY_VEL_P_ACC=1e-6)
+    for _ in range(2000):
+        answer = control.update(MotionSetpoint((5.0, 3.0, 1.0), STILL, 0.0), STILL, (0.1, 0.0, 0.0), 0.34, WIDE)
+        assert np.isfinite((*answer.attitude, answer.thrust)).all()
+
+
+def test_a_speed_limit_below_zero_is_none() -> None:
+    """At the target and at rest there is no speed to be divided by."""
+    control = controller(MPC_XY_VEL_MAX=-1.0)
+    answer = control.update(MotionSetpoint((1.0, 2.0, 3.0), STILL, 0.0), (1.0, 2.0, 3.0), STILL, 0.34, WIDE)
+    assert answer.thrust == pytest.approx(0.34)
+
+
+@pytest.mark.parametrize("hover", [0.0, -1.0, 1e-30])
+def test_a_senseless_hover_thrust_divides_nothing(hover: float) -> None:
+    """MPC_THR_HOVER may be set to anything."""
+    control = controller()
+    for _ in range(500):
+        answer = control.update(MotionSetpoint((5.0, 3.0, 1.0), STILL, 0.0), STILL, STILL, hover, WIDE)
+        assert np.isfinite((*answer.attitude, answer.thrust)).all()

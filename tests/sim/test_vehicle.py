@@ -8,6 +8,7 @@ import pytest
 
 from tests.sim.excitation import STILL, take_off
 from tests.sim.plants import PLANTS, plant
+from uasfly.errors import UasflyError
 from uasfly.files import find_file, load_file
 from uasfly.frames import euler_from_quaternion, quaternion_from_euler
 from uasfly.messages import FlightMode
@@ -310,3 +311,14 @@ def test_senseless_parameters_break_nothing() -> None:
         vehicle.advance_to(vehicle.time_s + 0.5)
         assert np.isfinite(vehicle.odometry().position_in_world).all()
         assert np.isfinite(vehicle.truth().quaternion_body_to_world).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [({"inertia_kg_m2": [1e-8, 1e-8, 1e-8]}, "f550"), ({"drag.linear_n_s_m": [1e8, 1e8, 1e8]}, "has run away")],
+)
+def test_a_plant_that_no_step_can_follow_ends_with_an_error(changes: dict[str, object], said: str) -> None:
+    """Instead of a state of NaN, and whatever fails at it first."""
+    vehicle = SimulatedVehicle(plant("f550", changes), windy(5.0), 1)
+    with pytest.raises(UasflyError, match=said):
+        take_off(vehicle, 3.0, 1.0)

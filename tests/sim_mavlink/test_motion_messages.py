@@ -8,6 +8,7 @@ from tests.sim_mavlink.bench import Bench, only
 from tests.sim_mavlink.fakes import YAW_RAD
 from uasfly.frames import quaternion_from_euler
 from uasfly.messages import FlightMode
+from uasfly.sim.mavlink.motion_messages import microseconds, milliseconds
 
 EARTH_RADIUS_M = 6371000.0
 REQUEST = 512
@@ -162,3 +163,27 @@ def test_values_beyond_a_field_are_cut_instead_of_raising(bench: Bench) -> None:
     bench.run(1.0)
     m = _message(bench, "GLOBAL_POSITION_INT")
     assert (m.vx, m.vy, m.vz) == (-32768, 32767, 32767)
+
+
+@pytest.mark.parametrize("part", ["position", "quaternion"])
+def test_an_estimate_that_is_not_finite_ends_no_simulation(bench: Bench, part: str) -> None:
+    """Fault odometry_nan: ODOMETRY carries the NaN, messages of whole numbers cannot and are left out."""
+    setattr(bench.vehicle, part, np.full(3 if part == "position" else 4, math.nan))
+    names = {message.get_type() for message in bench.run(1.0)}
+    assert {"ODOMETRY", "ATTITUDE", "LOCAL_POSITION_NED", "HEARTBEAT"} <= names
+    assert ("GLOBAL_POSITION_INT" in names) == (part == "quaternion")
+    assert ("VFR_HUD" in names) == (part == "position")
+
+
+def test_a_heading_that_is_not_known_has_its_own_number(bench: Bench) -> None:
+    """65535 in GLOBAL_POSITION_INT."""
+    bench.vehicle.quaternion = np.full(4, math.nan)
+    bench.run(0.5)
+    assert _message(bench, "GLOBAL_POSITION_INT").hdg == 65535
+
+
+def test_a_vehicle_far_away_or_before_its_start_still_reports(bench: Bench) -> None:
+    """Fields of whole numbers are cut: positions of a GNSS that has run away, a clock that was set back."""
+    bench.vehicle.position = np.array((1e9, -1e9, 1e9))
+    assert "GLOBAL_POSITION_INT" in {message.get_type() for message in bench.run(0.5)}
+    assert (milliseconds(-4.0), microseconds(-4.0)) == (0, 0)

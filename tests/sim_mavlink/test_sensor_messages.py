@@ -3,7 +3,12 @@ import math
 import pytest
 
 from tests.sim_mavlink.bench import Bench, only
+from uasfly.files import find_file, load_file
+from uasfly.sim.faults import GnssDegraded
 from uasfly.sim.mavlink.sensor_messages import pressure_of_altitude_hpa
+from uasfly.sim.plant import Plant
+from uasfly.sim.scenario import Scenario
+from uasfly.sim.vehicle import SimulatedVehicle
 
 
 def test_the_inertial_unit_is_told_in_frd() -> None:
@@ -49,3 +54,12 @@ def test_lost_gnss_leaves_an_empty_message_once_a_second() -> None:
     assert len(received) == pytest.approx(4, abs=1)
     m = received[-1]
     assert (m.fix_type, m.lat, m.satellites_visible, m.eph, m.vel) == (0, 0, 255, 65535, 65535)
+
+
+def test_a_receiver_that_knows_nothing_still_reports() -> None:
+    """Fault gnss_degraded: an accuracy beyond the field's millimetres is cut."""
+    plant, scenario = load_file(find_file("plant", "f550"), Plant), load_file(find_file("scenario", "calm"), Scenario)
+    vehicle = SimulatedVehicle(plant, scenario, 1)
+    vehicle.inject(GnssDegraded(kind="gnss_degraded", accuracy_m=1e8, satellites=0))
+    message = only(Bench(vehicle=vehicle).run(0.5), "GPS_RAW_INT")[-1]
+    assert message.h_acc == 0xFFFFFFFF

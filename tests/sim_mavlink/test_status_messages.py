@@ -161,3 +161,10 @@ def test_a_hexacopter_says_so(bench: Bench) -> None:
     """HEARTBEAT's type is the parameter MAV_TYPE."""
     bench.vehicle.parameters["MAV_TYPE"] = (int, 13)
     assert _last(bench, "HEARTBEAT").type == 13
+
+
+@pytest.mark.parametrize(("value", "told"), [(300, 255), (-1, 0), (2**31 - 1, 255)])
+def test_a_type_that_no_heartbeat_can_carry_is_cut(bench: Bench, value: int, told: int) -> None:
+    """PARAM_SET may set MAV_TYPE to anything."""
+    bench.vehicle.parameters["MAV_TYPE"] = (int, value)
+    assert _last(bench, "HEARTBEAT").type == told

@@ -36,6 +36,8 @@ def problems(name: str, *assignments: str) -> str:
         ("gnss_degraded", "sensors.position=mocap", "needs position_noise_m"),
         ("gnss_degraded", "sensors.position_noise_m=0.1", "use gnss.white_sigma_m"),
         ("calm", "link.jitter_s=-0.1", "jitter_s"),
+        ("gusty", "wind.mean.speed_at_10_m_m_s=1e200", "expected a number, not below 0 and not above 100"),
+        ("head_wind", "wind.jets[0].axis_speed=[[1, 1e9]]", "not above 100"),
     ],
 )
 def test_a_wrong_value_is_named(scenario: str, assignment: str, words: str) -> None:

@@ -160,6 +160,15 @@ def test_accelerating_in_wind_needs_both(f550):
     assert "deg of tilt" in finding.text
 
 
+def test_without_drag_less_wind_is_no_mend(f550):
+    """A vehicle without drag tilts for what it accelerates alone."""
+    settings = ["model.drag_1_s=[0, 0, 0]", "limits.tilt_deg=15", "limits.acceleration_m_s2=5"]
+    smooth = load_file(find_file("airframe", "f550"), Airframe, parse_overrides(settings))
+    finding = only(check_mission(mission({**LINE, "acceleration_m_s2": 4.0, "jerk_m_s3": 20.0}), smooth))
+    assert "deg of tilt" in finding.text
+    assert "lower limits.wind_m_s" not in finding.text
+
+
 def test_thrust_needs_headroom_too(f550):
     """A weak vehicle hovers and cannot lean into the wind; a lively one cannot fall as fast as asked."""
     weak = load_file(

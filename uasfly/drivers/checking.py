@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from uasfly.airframe import Airframe
-from uasfly.errors import FileError, UasflyError
-from uasfly.files import Kind, find_file, load_file, top_level_fields, write_schema
+from uasfly.errors import FileError, UasflyError, printable
+from uasfly.files import Kind, find_file, is_directory, is_file, load_file, top_level_fields, write_schema
 from uasfly.mission import Mission
 from uasfly.sim.plant import Plant
 from uasfly.sim.scenario import Scenario
@@ -40,7 +40,8 @@ class CheckFinding:
 
     def text(self) -> str:
         """One line for people."""
-        return f"{self.file}: {self.severity}: {self.message}" if self.severity != "ok" else f"{self.file}: ok"
+        file = printable(self.file)
+        return f"{file}: {self.severity}: {self.message}" if self.severity != "ok" else f"{file}: ok"
 
     def as_dict(self) -> dict[str, str]:
         """For scripts."""
@@ -108,7 +109,7 @@ def schema_of(kind: str) -> dict[str, Any]:
 
 def _locate(name: str) -> tuple[Path, Kind]:
     """Where a file is and what kind it is meant to be: by its fields, or by the folder that ships the name."""
-    if Path(name).suffix in (".yaml", ".yml") or Path(name).is_file():
+    if Path(name).suffix in (".yaml", ".yml") or is_file(Path(name)):
         path = Path(name)
         fields = top_level_fields(path)
         kind = max(_SIGNS, key=lambda candidate: len(_SIGNS[candidate] & fields))
@@ -120,4 +121,6 @@ def _locate(name: str) -> tuple[Path, Kind]:
             return find_file(candidate, name), candidate
         except FileError:
             continue
+    if is_directory(Path(name)):
+        raise FileError(name, ["it is a directory; expected a file"])
     raise FileError(name, ["no such file, and no mission, airframe, scenario or plant of this name is shipped"])

@@ -9,7 +9,7 @@ from typing import Any
 
 from uasfly.airframe import Airframe
 from uasfly.control.protocol import Controller
-from uasfly.errors import UasflyError
+from uasfly.errors import UasflyError, shortened
 from uasfly.files import find_file, load_file, parse_overrides
 from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot
@@ -77,7 +77,7 @@ def load_plan(
         FileError: for a file that cannot be used. UasflyError: for a flag that cannot be used.
     """
     if controller not in CONTROLLERS:
-        raise UasflyError(f"--controller: expected one of {', '.join(CONTROLLERS)}, found {controller!r}")
+        raise UasflyError(f"--controller: expected one of {', '.join(CONTROLLERS)}, found {shortened(controller)!r}")
     by_file = _split_settings(settings or [])
     airframe_model = load_file(find_file("airframe", airframe), Airframe, by_file["airframe"])
     mission_model = load_file(find_file("mission", mission), Mission, by_file["mission"])
@@ -131,7 +131,7 @@ def _split_settings(settings: list[str]) -> dict[str, dict[str, object]]:
         kind, _, rest = key.partition(".")
         if kind not in by_file or not rest:
             raise UasflyError(
-                f"--set {key}: expected a key that begins with {', '.join(f'{k}.' for k in by_file)}, "
+                f"--set {shortened(key)}: expected a key that begins with {', '.join(f'{k}.' for k in by_file)}, "
                 "for example --set airframe.limits.tilt_deg=25"
             )
         by_file[kind][rest] = value

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+import re
 import threading
 from collections.abc import Callable
 from queue import SimpleQueue
 
 from uasfly.airframe import Airframe
-from uasfly.errors import UasflyError
+from uasfly.errors import UasflyError, shortened
 from uasfly.files import find_file, load_file
 from uasfly.sim.fault_lines import FaultLines
 from uasfly.sim.faults import Fault
@@ -35,9 +36,9 @@ def simulate(
     Raises:
         UasflyError: wrong files or flags, or a busy port.
     """
-    host, colon, remote_port = remote.rpartition(":")
-    if not colon or not host or not remote_port.isdecimal() or not 0 < int(remote_port) < 65536:
-        raise UasflyError(f"--remote: expected host:port, for example 127.0.0.1:14540, found {remote!r}")
+    host, _, remote_port = remote.rpartition(":")
+    if not host or not re.fullmatch("[0-9]{1,5}", remote_port) or not 0 < int(remote_port) < 65536:
+        raise UasflyError(f"--remote: expected host:port, for example 127.0.0.1:14540, found {shortened(remote)!r}")
     plant_name = load_file(find_file("airframe", airframe), Airframe).plant
     plant = load_file(find_file("plant", plant_name), Plant)
     vehicle = SimulatedVehicle(plant, load_file(find_file("scenario", scenario), Scenario), seed)

@@ -96,5 +96,4 @@ class VehicleView:
 
 
 def _is_usable(sample: OdometrySample) -> bool:
-    total = float(sample.quaternion_body_to_world.sum()) + float(sample.velocity_in_world.sum())
-    return math.isfinite(total)
+    return all(map(math.isfinite, (*sample.quaternion_body_to_world.tolist(), *sample.velocity_in_world.tolist())))

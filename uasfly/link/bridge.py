@@ -13,8 +13,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mavsdk import Autopilot, ComponentType, Configuration, Mavsdk, System, log_subscribe
+from mavsdk import Autopilot, ComponentType, Configuration, Mavsdk, System
 from mavsdk.exceptions import ConnectionError as MavsdkConnectionError
+from mavsdk.logging import LogCallback, _cmavsdk_lib
 from mavsdk.plugins.events import Event, Events, HealthAndArmingCheckReport
 from mavsdk.plugins.mavlink_direct import MavlinkDirect, MavlinkDirectError, MavlinkMessage
 
@@ -54,7 +55,6 @@ class Bridge:
     """
 
     def __init__(self, url: str, system_id: int) -> None:
-        log_subscribe(_to_logging)
         configuration = Configuration.create_with_component_type(ComponentType.COMPANION_COMPUTER)
         configuration.system_id = system_id
         self._url = url
@@ -199,6 +199,12 @@ def _describe(system: System) -> HeardSystem:
     return HeardSystem(int(system.get_system_id()), autopilot)
 
 
-def _to_logging(level: int, message: str, _file: str | None, _line: int) -> bool:
-    _log.debug("%s", message, extra={"mavsdk_level": int(level)})
+def _to_logging(level: int, message: bytes | None, _file: bytes | None, _line: int, _user: object) -> bool:
+    _log.debug("%s", (message or b"").decode(errors="replace"), extra={"mavsdk_level": level})
     return True  # nothing of it goes to the terminal by itself
+
+
+# Not by `mavsdk.log_subscribe`, which takes every text for UTF-8: a status text with another byte in it would go to the
+# terminal as it is, with an error before it. The object must live as long as MAVSDK may call it.
+_LOG_CALLBACK = LogCallback(_to_logging)
+_cmavsdk_lib.mavsdk_log_subscribe(_LOG_CALLBACK, None)

@@ -17,6 +17,9 @@ from uasfly.messages import Sample, TextSample
 
 Handler = Callable[[dict[str, Any], float], Sample | None]
 
+# What decoding a message may raise whose fields are missing, of another type or out of all bounds.
+MALFORMED = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+
 MICRO = 1e-6
 MILLI = 1e-3
 
@@ -73,7 +76,7 @@ class Decoder:
         """
         try:
             return self._handlers[name](from_json(text, allow_inf_nan=False), arrival_s)
-        except (ValueError, KeyError, TypeError):  # a malformed message must not end the flight
+        except MALFORMED:  # such a message must not end the flight
             self.dropped[name] += 1
             return None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
+from uasfly.link.texts import one_line
 from uasfly.messages import TextSample
 
 KEPT = 64
@@ -19,11 +20,11 @@ class EventFeed:
 
     def add(self, arrival_s: float, severity: int, text: str) -> None:
         """Take one event."""
-        self._texts.append(TextSample(arrival_s, severity, text))
+        self._texts.append(TextSample(arrival_s, severity, one_line(text)))
 
     def set_problems(self, problems: tuple[str, ...]) -> None:
         """Take what presently keeps the vehicle from arming or from running its mode."""
-        self.problems = problems
+        self.problems = tuple(map(one_line, problems))
 
     def take(self) -> list[TextSample]:
         """All waiting texts, oldest first."""

@@ -6,7 +6,7 @@ import asyncio
 import socket
 from dataclasses import replace
 
-from uasfly.errors import LinkError
+from uasfly.errors import LinkError, shortened
 from uasfly.link.bridge import Bridge, HeardSystem
 from uasfly.link.ports import check_available
 from uasfly.link.urls import ConnectionUrl
@@ -82,8 +82,9 @@ async def _with_numeric_host(url: ConnectionUrl) -> ConnectionUrl:
         return url
     try:
         found = await asyncio.get_running_loop().getaddrinfo(url.host, url.port, family=socket.AF_INET)
-    except OSError as error:
-        raise LinkError(f"{url}: no host {url.host!r} is known ({error.strerror})") from error
+    except (OSError, UnicodeError) as error:  # the latter for a name that no host can have
+        reason = error.strerror if isinstance(error, OSError) else "no host can have this name"
+        raise LinkError(f"{url}: no host {shortened(url.host)!r} is known ({reason})") from error
     return replace(url, host=str(found[0][4][0]))
 
 

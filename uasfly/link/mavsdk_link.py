@@ -19,7 +19,7 @@ from uasfly.frames import swap_enu_ned
 from uasfly.link.bridge import Bridge
 from uasfly.link.clock import ClockMap
 from uasfly.link.commands import CommandChannel
-from uasfly.link.decoder import Decoder
+from uasfly.link.decoder import MALFORMED, Decoder
 from uasfly.link.encode import attitude_target, check_setpoint, status_texts
 from uasfly.link.events import EchoFilter, EventFeed
 from uasfly.link.finding import find_vehicle, refuse_several
@@ -321,7 +321,7 @@ class MavsdkLink:
             for arrival_s, text in slot.take():
                 try:
                     handle(from_json(text), arrival_s)
-                except (ValueError, KeyError, TypeError):
+                except MALFORMED:
                     self._decoder.dropped[slot.name] += 1
 
     def _take_time(self, fields: dict[str, Any], arrival_s: float) -> None:

@@ -46,7 +46,7 @@ def odometry_sample(fields: Fields, time_s: float) -> OdometrySample | None:
 def attitude_target_sample(fields: Fields, time_s: float) -> AttitudeTargetSample | None:
     """ATTITUDE_TARGET: what PX4's attitude controller is asked for."""
     quaternion, thrust = unit_quaternion(fields["q"]), fields["thrust"]
-    if quaternion is None or thrust is None:
+    if quaternion is None or thrust is None or not math.isfinite(thrust):
         return None
     return AttitudeTargetSample(time_s, swap_quaternion_enu_ned(quaternion), float(thrust))
 
@@ -56,7 +56,7 @@ def battery_sample(fields: Fields, time_s: float) -> BatterySample | None:
     cells = [cell for cell in fields["voltages"] if cell is not None and cell != CELL_UNKNOWN_MV]
     cells += [cell for cell in fields.get("voltages_ext", ()) if cell]  # here 0 means unknown
     voltage_v = sum(cells) * 1e-3
-    if voltage_v <= 0.0:
+    if not 0.0 < voltage_v < math.inf:
         return None
     percent = fields["battery_remaining"]
     return BatterySample(time_s, voltage_v, math.nan if percent < 0 else percent * 1e-2)
@@ -73,4 +73,10 @@ def unit_quaternion(values: Any) -> Array | None:
 
 def _vector(fields: Fields, *names: str) -> Array | None:
     values = [fields[name] for name in names]
-    return None if None in values else np.array(values, dtype=float)
+    return None if None in values else finite(values)
+
+
+def finite(values: Any) -> Array | None:
+    """Numbers as an array; None where one is not finite."""
+    array = np.array(values, dtype=np.float64)
+    return array if np.isfinite(array).all() else None

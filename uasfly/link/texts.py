@@ -9,6 +9,7 @@ from typing import Any
 from uasfly.link.encode import TEXT_BYTES
 
 PATIENCE_S = 0.5
+CHUNKS = 256  # chunk_seq is a byte: no text has more
 
 
 @dataclass(slots=True)
@@ -36,14 +37,16 @@ class TextAssembler:
         """
         severity, text = int(fields["severity"]), str(fields["text"])
         identity, sequence = int(fields.get("id", 0)), int(fields.get("chunk_seq", 0))
+        if not 0 <= sequence < CHUNKS:
+            raise ValueError(f"expected a chunk_seq in 0..{CHUNKS - 1}, found {sequence}")
         ends = len(text.encode()) < TEXT_BYTES
         if identity == 0 or (sequence == 0 and ends):
-            return severity, _clean(text)
+            return severity, one_line(text)
         entry = self._unfinished.setdefault(identity, _Unfinished(severity, arrival_s))
         entry.chunks.extend(["..."] * (sequence - len(entry.chunks)))
         entry.chunks.append(text)
         entry.arrival_s = arrival_s
-        return self._finish(identity) if ends else None
+        return self._finish(identity) if ends or len(entry.chunks) >= CHUNKS else None
 
     def overdue(self, now_s: float) -> list[tuple[int, str]]:
         """Texts whose last chunk came more than half a second ago: no further one will come."""
@@ -52,8 +55,9 @@ class TextAssembler:
 
     def _finish(self, identity: int) -> tuple[int, str]:
         entry = self._unfinished.pop(identity)
-        return entry.severity, _clean("".join(entry.chunks))
+        return entry.severity, one_line("".join(entry.chunks))
 
 
-def _clean(text: str) -> str:
-    return " ".join(text.replace("\x00", " ").split())  # PX4 ends texts that are also events with a tab
+def one_line(text: str) -> str:
+    """One line that may go to a terminal: PX4 ends texts that are events too with a tab, others send what they like."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())

@@ -11,6 +11,7 @@ from uasfly.link.encode import time_request
 
 FAST_INTERVAL_S = 0.1
 SLOW_INTERVAL_S = 0.5
+LARGEST_NS = 2**63
 OUTSTANDING = 16  # requests whose answers are still accepted
 
 
@@ -41,8 +42,13 @@ class TimeSync:
 
         Returns:
             Whether it shows that the vehicle has restarted.
+
+        Raises:
+            ValueError: a time is none: the clock map would not come back from it.
         """
         vehicle_ns, sent_ns = fields["tc1"], fields["ts1"]
+        if not (abs(vehicle_ns) < LARGEST_NS and abs(sent_ns) < LARGEST_NS):
+            raise ValueError(f"expected times of 64 bits, found {vehicle_ns} and {sent_ns}")
         if not vehicle_ns:
             return self._clock.watch(sent_ns * 1e-9)
         if sent_ns not in self._outstanding:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from uasfly.frames import swap_enu_ned, swap_quaternion_enu_ned
-from uasfly.link.motion import unit_quaternion
+from uasfly.link.motion import finite, unit_quaternion
 from uasfly.messages import Array, TruthSample
 
 Fields = Mapping[str, Any]
@@ -34,7 +34,9 @@ def simulated_truth(fields: Fields, time_s: float) -> TruthSample | None:
     quaternion = unit_quaternion(values[QUATERNION])
     if None in values or quaternion is None:
         return None
-    data = np.array(values, dtype=np.float64)
+    data = finite(values)
+    if data is None:
+        return None
     return TruthSample(time_s, data[POSITION], data[VELOCITY], quaternion, data[FORCE], data[WIND])
 
 
@@ -60,21 +62,23 @@ class GeographicTruth:
         quaternion = unit_quaternion(fields["attitude_quaternion"])
         if self._origin is None or quaternion is None:
             return None
-        velocity = np.array((fields["vx"], fields["vy"], fields["vz"]), dtype=np.float64) * 1e-2
+        velocity, position = finite((fields["vx"], fields["vy"], fields["vz"])), self._position(fields, self._origin)
+        if velocity is None or position is None:
+            return None
         unknown = np.full(3, math.nan)
         return TruthSample(
             time_s,
-            self._position(fields, self._origin),
-            swap_enu_ned(velocity),
+            position,
+            swap_enu_ned(velocity * 1e-2),
             swap_quaternion_enu_ned(quaternion),
             unknown,
             unknown,
         )
 
     @staticmethod
-    def _position(fields: Fields, origin: tuple[float, float, float]) -> Array:
-        """ENU position [m] on the sphere, flat: 1 mm off at 300 m."""
+    def _position(fields: Fields, origin: tuple[float, float, float]) -> Array | None:
+        """ENU position [m] on the sphere, flat: 1 mm off at 300 m; None where it is not finite."""
         latitude, longitude = math.radians(fields["lat"] * 1e-7), math.radians(fields["lon"] * 1e-7)
         east = EARTH_RADIUS_M * math.cos(origin[0]) * (longitude - origin[1])
         north = EARTH_RADIUS_M * (latitude - origin[0])
-        return np.array((east, north, fields["alt"] * 1e-3 - origin[2]))
+        return finite((east, north, fields["alt"] * 1e-3 - origin[2]))

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal, cast
 
-from uasfly.errors import LinkError
+from uasfly.errors import LinkError, shortened
 
 Scheme = Literal["udpin", "udpout", "tcpin", "tcpout", "serial"]
 
@@ -64,7 +64,7 @@ def parse_url(text: str) -> ConnectionUrl:
         raise _wrong(text, "it has none of the accepted forms")
     scheme, host = network["scheme"].lower(), network["host"]
     if scheme not in {"udp", "udpin", "udpout", "tcp", "tcpin", "tcpout"}:
-        raise _wrong(text, f"the scheme {scheme!r} is not known")
+        raise _wrong(text, f"the scheme {shortened(scheme)!r} is not known")
     if not network["port"] and host.isdigit():  # udp:14540
         host, port_text = "", host
     else:
@@ -92,10 +92,10 @@ def _serial(text: str, device: str, baud_text: str | None) -> ConnectionUrl:
 
 
 def _number(text: str, what: str, number: str, low: int, high: int) -> int:
-    if not number.isdigit() or not low <= int(number) <= high:
-        raise _wrong(text, f"the {what} must be a number in {low}..{high}, found {number!r}")
+    if not re.fullmatch("[0-9]{1,7}", number) or not low <= int(number) <= high:  # "²" is a digit too, to Python
+        raise _wrong(text, f"the {what} must be a number in {low}..{high}, found {shortened(number)!r}")
     return int(number)
 
 
 def _wrong(text: str, reason: str) -> LinkError:
-    return LinkError(f"connection URL {text!r}: {reason}\n{ACCEPTED_FORMS}")
+    return LinkError(f"connection URL {shortened(text)!r}: {reason}\n{ACCEPTED_FORMS}")

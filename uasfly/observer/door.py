@@ -9,7 +9,9 @@ import numpy as np
 
 from uasfly.messages import Array, MarkerSample, OdometrySample
 
-_LARGEST_SQUARED = 1e14  # of m, m/s, rad/s: beyond it a number is as good as infinite
+_LARGEST_SQUARED = 1e14  # of m: beyond it a number is as good as infinite
+_FASTEST_SQUARED = 1e6  # of m/s: no vehicle is as fast
+_TURNS_SQUARED = 40.0**2  # of rad/s: a flight controller's gyro ends at 35, and no gate holds back what is beyond it
 _NORM_TOLERANCE = 0.05  # a quaternion further from unit length is no rotation
 
 
@@ -43,12 +45,12 @@ class Odometry:
         return self.rate is not None and self.use == _ALL
 
 
-def plausible(values: list[float]) -> bool:
+def plausible(values: list[float], largest_squared: float = _LARGEST_SQUARED) -> bool:
     """Whether every number is finite and none is absurdly large."""
     total = 0.0
     for value in values:
         total += value * value
-    return total < _LARGEST_SQUARED  # False for NaN
+    return total < largest_squared  # False for NaN
 
 
 def checked_odometry(sample: OdometrySample) -> Odometry | None:
@@ -56,8 +58,8 @@ def checked_odometry(sample: OdometrySample) -> Odometry | None:
     position, velocity = sample.position_in_world.tolist(), sample.velocity_in_world.tolist()
     rate: list[float] | None = sample.angular_rate_in_body.tolist()
     quaternion = unit_quaternion(sample.quaternion_body_to_world.tolist())
-    use_position, use_velocity = plausible(position), plausible(velocity)
-    if rate is not None and not plausible(rate):
+    use_position, use_velocity = plausible(position), plausible(velocity, _FASTEST_SQUARED)
+    if rate is not None and not plausible(rate, _TURNS_SQUARED):
         rate = None
     if not math.isfinite(sample.time_s) or not (quaternion or use_position or use_velocity):
         return None

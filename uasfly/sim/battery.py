@@ -52,9 +52,9 @@ class Battery:
         if not self._pack.lowers_thrust:
             return rotors.full_speed_rad_s
         resistive = rotors.motor_resistance_ohm * self._speed_constant * self._torque_coefficient()
-        if rotors.speed_exponent == 1 or resistive == 0.0:
-            return self.voltage_v / (1.0 / self._speed_constant + resistive)
         back = 1.0 / self._speed_constant
+        if rotors.speed_exponent == 1 or resistive * self.voltage_v < 1e-12 * back * back:
+            return self.voltage_v / (back + resistive)  # the difference below would cancel to zero
         return (math.sqrt(back * back + 4.0 * resistive * self.voltage_v) - back) / (2.0 * resistive)
 
     def _torque_coefficient(self) -> float:

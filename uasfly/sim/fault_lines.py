@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
+from uasfly.airframe import FileModel
 from uasfly.errors import FileError
+from uasfly.file_problems import describe_problems
 from uasfly.sim.faults import Fault
 from uasfly.yaml_text import parse_yaml
 
 LONGEST_LINE = 4096
-_FAULT: TypeAdapter[Fault] = TypeAdapter(Fault)
+SOURCE = "fault line"
+EXAMPLE = "{kind: gnss_lost, duration_s: 20}"
+
+
+class FaultLine(FileModel):
+    """A line, as if it stood in a file."""
+
+    fault: Fault
 
 
 def parse_fault(line: str) -> Fault:
@@ -20,14 +30,12 @@ def parse_fault(line: str) -> Fault:
     Raises:
         FileError: the line is none; the text says what was expected.
     """
-    data = parse_yaml(line, "fault").data
+    data = parse_yaml(line, SOURCE).data
     try:
-        return _FAULT.validate_python(data)
+        return FaultLine.model_validate_json(json.dumps({"fault": data}), strict=True).fault
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(str(part) for part in first["loc"]) or "it"
-        example = "{kind: gnss_lost, duration_s: 20}"
-        raise FileError("fault", [f"{place}: {first['msg']}; expected for example {example}"]) from error
+        problems = describe_problems(error, FaultLine, lambda _: "")
+        raise FileError(SOURCE, [f"{problem} (example: {EXAMPLE})" for problem in problems]) from None
 
 
 class FaultLines:
@@ -48,7 +56,7 @@ class FaultLines:
         *lines, self._rest = (self._rest + data).split(b"\n")
         if len(self._rest) > LONGEST_LINE:
             self._rest = b""
-            self._complain(f"fault: a line longer than {LONGEST_LINE} bytes was left out")
+            self._complain(f"{SOURCE}: a line longer than {LONGEST_LINE} bytes was left out")
         for line in lines:
             if line.strip():
                 self._take(line.decode(errors="replace"))

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from uasfly.airframe import FileModel, NonNegative, Positive
 from uasfly.messages import FlightMode
-from uasfly.sim.wind.settings import Fraction, Vector
+from uasfly.sim.wind.settings import AirVelocity, Fraction, Vector
 
 Direction = Literal["both", "telemetry", "commands"]
 ModeName = Literal["hold", "offboard", "land", "return", "position"]
@@ -100,7 +100,7 @@ class Wind(Lasting):
     """Wind that is added to the scenario's."""
 
     kind: Literal["wind"]
-    velocity_m_s: Annotated[Vector, Field(description="towards x east, y north, z up")]
+    velocity_m_s: Annotated[AirVelocity, Field(description="towards x east, y north, z up")]
     ramp_s: Annotated[Positive, Field(description="it rises and falls in this time")] = 1.0
 
 

@@ -30,7 +30,7 @@ def mixing_matrix(rotors: Rotors) -> Array:
     positions, spins = np.array(rotors.positions_m), np.array(rotors.spins)
     effect = np.vstack((positions[:, 1], -positions[:, 0], -spins * rotors.torque_per_thrust_m, np.ones(rotors.count)))
     mix = np.linalg.pinv(effect)
-    mix[np.abs(mix) < 1e-9 * np.abs(mix).max()] = 0.0
+    mix[np.abs(mix) < 1e-9 * np.abs(mix).max(axis=0)] = 0.0  # what is left of zeros, in each column's own unit
     tilting = np.count_nonzero(mix[:, :2], axis=0)
     mix[:, :2] /= np.sqrt((mix[:, :2] ** 2).sum(axis=0) / (tilting / 2.0)).max()
     mix[:, YAW] /= np.abs(mix[:, YAW]).max()

@@ -7,17 +7,21 @@ out of them when the plant is flown.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
 from uasfly.airframe import FileModel, NonNegative, Positive, Triple
+from uasfly.errors import shortened
+from uasfly.file_problems import nearest
 from uasfly.sim.parameters import ParameterTable
 
 AIR_DENSITY_KG_M3 = 1.225  # ICAO standard atmosphere, sea level
 
 PositiveTriple = tuple[Positive, Positive, Positive]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+ParameterValue = Annotated[float, Field(ge=-(2.0**31), le=2.0**31 - 1.0, allow_inf_nan=False)]
 
 # Azimuth of each arm from the nose, counter-clockwise [deg], and spin of its rotor from above (+1 counter-clockwise,
 # -1 clockwise), in PX4's motor order (airframe reference: Quadrotor x, Hexarotor x).
@@ -31,14 +35,18 @@ class Rotors(FileModel):
     """The rotors, all alike. Thrust in still air is thrust_coefficient * speed ** 2 (* speed with the linear law)."""
 
     layout: Literal["quad_x", "hex_x"]
-    arm_length_m: Annotated[Positive, Field(description="from the centre of mass to a rotor axis, seen from above")]
+    arm_length_m: Annotated[
+        float, Field(gt=0.01, le=10.0, description="from the centre of mass to a rotor axis, seen from above")
+    ]
     height_m: Annotated[float, Field(ge=-0.5, le=0.5, description="rotor plane above the centre of mass")] = 0.0
-    radius_m: Positive
+    radius_m: Annotated[float, Field(gt=0.001, le=10.0)]
     thrust_law: Annotated[
         Literal["quadratic", "linear"], Field(description="linear: PX4's SIH, which has no blades to speak of")
     ] = "quadratic"
     thrust_coefficient: Annotated[Positive, Field(description="[N s^2] with the quadratic law, [N s] with the linear")]
-    torque_per_thrust_m: Annotated[NonNegative, Field(description="drag torque over thrust in hover")]
+    torque_per_thrust_m: Annotated[
+        float, Field(gt=1e-5, le=1.0, description="drag torque over thrust in hover; it is what turns the vehicle")
+    ]
     full_speed_rad_s: Annotated[Positive, Field(description="at full command and battery.reference_voltage_v")]
     motor_resistance_ohm: Annotated[NonNegative, Field(description="winding and speed controller, each motor")] = 0.0
     lag_s: Annotated[float, Field(ge=0.01, le=0.5, description="first-order lag of the speed")]
@@ -131,8 +139,14 @@ class BatteryPack(FileModel):
     def _curve_ascends_over_all_charges(cls, curve: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
         charges, voltages = [point[0] for point in curve], [point[1] for point in curve]
         if charges[0] != 0.0 or charges[-1] != 1.0 or charges != sorted(set(charges)) or voltages != sorted(voltages):
-            raise ValueError(f"charge must ascend from 0 to 1 and voltage must not fall, found {list(curve)}")
+            shown = shortened(str(list(curve)), 200)
+            raise ValueError(f"charge must ascend from 0 to 1 and voltage must not fall, found {shown}")
         return curve
+
+
+def _like(name: str, known: Iterable[str]) -> str:
+    match = nearest(name, known)
+    return f"did you mean {match}?" if match else "leave it out"
 
 
 class Plant(FileModel):
@@ -147,7 +161,7 @@ class Plant(FileModel):
     gear: LandingGear
     battery: BatteryPack
     parameters: Annotated[
-        dict[str, float],
+        dict[str, ParameterValue],
         Field(default_factory=dict, description="PX4 parameters of this vehicle other than the simulation's defaults"),
     ]
 
@@ -157,9 +171,9 @@ class Plant(FileModel):
         known = ParameterTable()
         unknown = sorted(set(parameters) - set(known))
         if unknown:
-            raise ValueError(
-                f"unknown PX4 parameters {', '.join(unknown)}; the simulation has {', '.join(sorted(known))}"
-            )
+            others = f", and {len(unknown) - 1} more" if len(unknown) > 1 else ""
+            name = unknown[0]
+            raise ValueError(f"the simulation has no PX4 parameter {shortened(name)}{others}; {_like(name, known)}")
         return parameters
 
     @model_validator(mode="after")
@@ -186,7 +200,7 @@ class Plant(FileModel):
         """
         rotors, voltage, speed = self.rotors, self.battery.reference_voltage_v, self.rotors.full_speed_rad_s
         resistive = rotors.motor_resistance_ohm * rotors.torque_per_thrust_m * rotors.static_thrust_n(speed)
-        if resistive == 0.0:
+        if resistive * speed < 1e-12 * voltage * voltage:  # as good as none, and the difference below would be zero
             return speed / voltage
         discriminant = voltage * voltage - 4.0 * resistive * speed
         return None if discriminant < 0.0 else (voltage - math.sqrt(discriminant)) / (2.0 * resistive)

@@ -16,6 +16,7 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 _SMALLEST_THRUST = 1e-3
+_LARGEST_INTEGRAL = 100.0  # m/s^2, far beyond every tilt: a senseless gain must not carry it to infinity
 
 
 @dataclass(slots=True)
@@ -80,7 +81,7 @@ class PositionControl:
         self._position_gain = (value("MPC_XY_P"), value("MPC_Z_P"))
         self._horizontal = tuple(value(f"MPC_XY_VEL_{term}_ACC") for term in "PID")
         self._vertical = tuple(value(f"MPC_Z_VEL_{term}_ACC") for term in "PID")
-        self._speed_limit = value("MPC_XY_VEL_MAX")
+        self._speed_limit = max(0.0, value("MPC_XY_VEL_MAX"))
         self._climb_limit, self._sink_limit = value("MPC_Z_VEL_MAX_UP"), value("MPC_Z_VEL_MAX_DN")
         self._thrust_range = (value("MPC_THR_MIN"), max(value("MPC_THR_MAX"), 0.1))
         self._margin = value("MPC_THR_XY_MARG")
@@ -143,9 +144,11 @@ class PositionControl:
 
         As PX4's PositionControl::updateHoverThrust: T = hover (1 + a / g) is the same before and after.
         """
+        hover_thrust = max(hover_thrust, _SMALLEST_THRUST)  # MPC_THR_HOVER may be anything
         if self._hover_thrust is not None:
             specific_force = self._last_acceleration_z + GRAVITY_M_S2
-            self._integral[2] += specific_force * (self._hover_thrust / hover_thrust - 1.0)
+            value = self._integral[2] + specific_force * (self._hover_thrust / hover_thrust - 1.0)
+            self._integral[2] = min(_LARGEST_INTEGRAL, max(-_LARGEST_INTEGRAL, value))
         self._hover_thrust = hover_thrust
 
     def _velocity_error(self, setpoint: MotionSetpoint, position: Vector, velocity: Vector) -> Vector:
@@ -180,8 +183,9 @@ class PositionControl:
             excess = 2.0 / proportional * (1.0 - reached / flat)
             error_x -= excess * wanted_x
             error_y -= excess * wanted_y
-        self._integral[0] += integral * error_x * self._duration_s
-        self._integral[1] += integral * error_y * self._duration_s
+        for axis, error in enumerate((error_x, error_y)):
+            value = self._integral[axis] + integral * error * self._duration_s
+            self._integral[axis] = min(_LARGEST_INTEGRAL, max(-_LARGEST_INTEGRAL, value))
 
     def _differentiate(self, velocity: Vector) -> None:
         if self._last_velocity is not None:

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from uasfly.errors import UasflyError
 from uasfly.messages import (
     Array,
     AttitudeTargetSample,
@@ -37,6 +38,7 @@ from uasfly.sim.sensors import GnssSample, InertialSample, RawSensors
 from uasfly.sim.wind.field import WindField
 
 _OUTER_STEPS = 2  # position control at 125 Hz, as PX4's local position
+_BEYOND = 1e9  # m, m/s, rad/s: no vehicle is there
 _STILL = (0.0, 0.0, 0.0)
 _SLOW_STEPS = 10  # commander, land detector and battery at 25 Hz
 
@@ -52,7 +54,8 @@ class SimulatedVehicle:
         start_yaw_rad: its heading there.
 
     Raises:
-        UasflyError: a fault of the scenario is none of this vehicle.
+        UasflyError: a fault of the scenario is none of this vehicle; while it runs, where the figures of plant or
+            scenario are so odd that the state runs away.
 
     Attributes:
         step_s: length of a step. parameters: PX4's parameters, name -> (type, value). boots: how often it has started.
@@ -156,9 +159,18 @@ class SimulatedVehicle:
             free = (free[0] + east, free[1] + north, free[2] + up)
         dynamics.wind[:] = array("d", free + air.jet_in_world)
         dynamics.step()
+        if not -_BEYOND < sum(state) < _BEYOND:
+            raise UasflyError(self._run_away())
         self._steps = steps + 1
         self._estimate.advance()
         self._sensors.advance()
+
+    def _run_away(self) -> str:
+        return (
+            f"the simulation of plant {self._plant.name} in scenario {self._scenario.name} has run away at "
+            f"{self._steps * STEP_S:.2f} s: expected a state that steps of {STEP_S:g} s can follow; check mass, "
+            "inertia, thrust and drag of the plant, and wind and faults of the scenario"
+        )
 
     def set_attitude_target(self, quaternion_body_to_world: Array, thrust: float, yaw_rate_rad_s: float | None) -> None:
         """Take a setpoint as SET_ATTITUDE_TARGET carries it; it acts in offboard.

@@ -244,7 +244,8 @@ def _headroom(mission: Mission, airframe: Airframe, wind: float, worst: _Effort)
         yield Finding("warning", "limits.wind_m_s", text)
     share = math.tan(worst.tilt) / math.tan(limits.tilt_rad) if worst.tilt < 0.5 * math.pi else math.inf
     if share > 1.0 - MARGIN:
-        possible = f"lower limits.wind_m_s to {_down(worst.wind_by_tilt)}, " if worst.wind_by_tilt > 0.1 else ""
+        helps = 0.1 < worst.wind_by_tilt < math.inf  # without drag less wind helps nothing
+        possible = f"lower limits.wind_m_s to {_down(worst.wind_by_tilt)}, " if helps else ""
         text = (
             f"legs[{worst.tilt_span}] in {wind:g} m/s of wind takes {math.degrees(worst.tilt):.1f} deg of tilt; "
             f"{name} may tilt {limits.tilt_deg:g} deg and should keep {MARGIN:.0%} for gusts; "

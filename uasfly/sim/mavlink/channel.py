@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from pymavlink.dialects.v20 import development as dialect
 
-from uasfly.errors import LinkError
+from uasfly.errors import LinkError, shortened
 from uasfly.sim.link_faults import LinkFaults
 from uasfly.sim.mavlink.framing import FrameReader, Message
 from uasfly.sim.mavlink.identity import Identity
@@ -144,8 +144,10 @@ class UdpChannel:
 def _resolve(remote: Address) -> Address:
     try:
         return socket.gethostbyname(remote[0]), remote[1]
-    except OSError as error:
-        raise LinkError(f"cannot find the host {remote[0]!r} to send MAVLink to: {error}; use an IP address") from error
+    except (OSError, UnicodeError) as error:  # the latter for a name that no host can have
+        raise LinkError(
+            f"cannot find the host {shortened(remote[0])!r} to send MAVLink to: {error}; use an IP address"
+        ) from error
 
 
 def _bound_socket(local_port: int, loopback: bool) -> socket.socket:

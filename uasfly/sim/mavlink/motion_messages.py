@@ -22,21 +22,32 @@ YAW_VARIANCE_RAD2 = 4e-3
 HORIZONTAL_VELOCITY_VARIANCE = 9e-3
 VERTICAL_VELOCITY_VARIANCE = 1.3e-3
 _IGNORE_POSITION_AND_VELOCITY = 63
+_UNKNOWN_HEADING = 0xFFFF
 
 
 def milliseconds(time_s: float) -> int:
-    """Time since boot as MAVLink's 32-bit milliseconds."""
-    return int(time_s * 1e3 + 1e-6) & 0xFFFFFFFF
+    """Time since boot as MAVLink's 32-bit milliseconds; 0 for a clock that has been set back beyond its start."""
+    return max(0, int(time_s * 1e3 + 1e-6)) & 0xFFFFFFFF
 
 
 def microseconds(time_s: float) -> int:
-    """Time since boot as MAVLink's microseconds."""
-    return int(time_s * 1e6 + 0.5)
+    """Time since boot as MAVLink's microseconds; 0 for a clock that has been set back beyond its start."""
+    return max(0, int(time_s * 1e6 + 0.5))
 
 
 def int16(value: float) -> int:
     """Whole number that fits a signed 16-bit field."""
     return int(min(32767.0, max(-32768.0, value)))
+
+
+def int32(value: float) -> int:
+    """Whole number that fits a signed 32-bit field."""
+    return int(min(2147483647.0, max(-2147483648.0, value)))
+
+
+def centidegrees(heading_deg: float) -> int:
+    """Heading of GLOBAL_POSITION_INT; 65535 where it is not known."""
+    return int(heading_deg * 100.0) % 36000 if math.isfinite(heading_deg) else _UNKNOWN_HEADING
 
 
 def attitude(view: VehicleView) -> Message:
@@ -135,22 +146,24 @@ def position_target_local(view: VehicleView) -> Message | None:
     )
 
 
-def global_position(view: VehicleView) -> Message:
-    """GLOBAL_POSITION_INT."""
-    motion = view.motion
+def global_position(view: VehicleView) -> Message | None:
+    """GLOBAL_POSITION_INT; None where the position is not known: its whole numbers cannot say so."""
+    motion, home_down = view.motion, view.home.position_m[2]
     north, east, down = motion.position_m
+    if not all(map(math.isfinite, (*motion.position_m, home_down, *motion.velocity_m_s))):
+        return None
     latitude, longitude, above_sea = geographic_position((east, north, -down))
     v_north, v_east, v_down = motion.velocity_m_s
     return dialect.MAVLink_global_position_int_message(
         milliseconds(motion.time_s),
-        int(latitude * 1e7),
-        int(longitude * 1e7),
-        int(above_sea * 1e3),
-        int((view.home.position_m[2] - down) * 1e3),
+        int32(latitude * 1e7),
+        int32(longitude * 1e7),
+        int32(above_sea * 1e3),
+        int32((home_down - down) * 1e3),
         int16(v_north * 100.0),
         int16(v_east * 100.0),
         int16(v_down * 100.0),
-        int(motion.heading_deg * 100.0) % 36000,
+        centidegrees(motion.heading_deg),
     )
 
 
@@ -164,9 +177,11 @@ def altitude(view: VehicleView) -> Message:
     )
 
 
-def vfr_hud(view: VehicleView) -> Message:
-    """VFR_HUD; no airspeed sensor, so NaN."""
+def vfr_hud(view: VehicleView) -> Message | None:
+    """VFR_HUD; no airspeed sensor, so NaN; None where the heading is not known: its whole number cannot say so."""
     motion = view.motion
+    if not math.isfinite(motion.heading_deg):
+        return None
     v_north, v_east, v_down = motion.velocity_m_s
     throttle = int(100.0 * view.vehicle.attitude_target().thrust) if view.state.armed else 0
     return dialect.MAVLink_vfr_hud_message(
@@ -179,15 +194,17 @@ def vfr_hud(view: VehicleView) -> Message:
     )
 
 
-def home_position(view: VehicleView) -> Message:
-    """HOME_POSITION."""
+def home_position(view: VehicleView) -> Message | None:
+    """HOME_POSITION; None where the position was not known when the vehicle was armed."""
     home = view.home
+    if not all(map(math.isfinite, home.position_m)):
+        return None
     north, east, down = home.position_m
     latitude, longitude, above_sea = geographic_position((east, north, -down))
     return dialect.MAVLink_home_position_message(
-        int(latitude * 1e7),
-        int(longitude * 1e7),
-        int(above_sea * 1e3),
+        int32(latitude * 1e7),
+        int32(longitude * 1e7),
+        int32(above_sea * 1e3),
         north,
         east,
         down,

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from uasfly.frames import swap_enu_ned, swap_flu_frd
 from uasfly.sim.mavlink.framing import Message
-from uasfly.sim.mavlink.motion_messages import microseconds, milliseconds
+from uasfly.sim.mavlink.motion_messages import int32, microseconds, milliseconds
 from uasfly.sim.mavlink.vehicle_view import VehicleView
 from uasfly.sim.sensors import GnssSample
 
@@ -16,6 +16,7 @@ TEMPERATURE_C = 15.0
 GNSS_LOST_INTERVAL_S = 1.0
 # fields of HIGHRES_IMU that are new: accelerometer, gyro, magnetometer, barometer
 _FIELDS_UPDATED = 0x3F | 0x1C0 | 0x1A00
+_LARGEST_U32 = 0xFFFFFFFF
 _UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
 _EPH, _EPV = 70, 110  # dilution of precision times 100, and
 _VELOCITY_ACCURACY_MM_S = 400  # accuracy of PX4's simulated receiver
@@ -69,13 +70,13 @@ def pressure_of_altitude_hpa(altitude_m: float) -> float:
 
 def _fix(sample: GnssSample) -> Message:
     v_north, v_east, v_down = swap_enu_ned(sample.velocity_in_world).tolist()
-    altitude_mm = round(sample.altitude_m * 1e3)
+    altitude_mm = int32(round(sample.altitude_m * 1e3))
     speed = math.sqrt(v_north * v_north + v_east * v_east + v_down * v_down)
     return dialect.MAVLink_gps_raw_int_message(
         microseconds(sample.time_s),
         sample.fix,
-        round(sample.latitude_deg * 1e7),
-        round(sample.longitude_deg * 1e7),
+        int32(round(sample.latitude_deg * 1e7)),
+        int32(round(sample.longitude_deg * 1e7)),
         altitude_mm,
         _EPH,
         _EPV,
@@ -83,8 +84,8 @@ def _fix(sample: GnssSample) -> Message:
         int(math.degrees(math.atan2(v_east, v_north)) % 360.0 * 100.0) % 36000,
         sample.satellites,
         altitude_mm,
-        round(sample.horizontal_accuracy_m * 1e3),
-        round(sample.vertical_accuracy_m * 1e3),
+        min(_LARGEST_U32, round(sample.horizontal_accuracy_m * 1e3)),
+        min(_LARGEST_U32, round(sample.vertical_accuracy_m * 1e3)),
         _VELOCITY_ACCURACY_MM_S,
     )
 

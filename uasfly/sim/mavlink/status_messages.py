@@ -44,7 +44,7 @@ def heartbeat(view: VehicleView) -> Message:
     else:
         status = dialect.MAV_STATE_STANDBY if view.can_arm else dialect.MAV_STATE_UNINIT
     return dialect.MAVLink_heartbeat_message(
-        round(view.parameter("MAV_TYPE", dialect.MAV_TYPE_QUADROTOR)),
+        min(0xFF, max(0, round(view.parameter("MAV_TYPE", dialect.MAV_TYPE_QUADROTOR)))),
         dialect.MAV_AUTOPILOT_PX4,
         base_mode(state.mode, state.armed, view.setpoints_arrive),
         custom_mode(state.mode),

@@ -14,8 +14,12 @@ from pydantic import Field, field_validator, model_validator
 
 from uasfly.airframe import FileModel, NonNegative, Positive
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+Finite = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
+FASTEST_AIR_M_S = 100.0  # a hurricane; the drag of much more than that no step of the simulation can follow
+AirSpeed = Annotated[float, Field(ge=0.0, le=FASTEST_AIR_M_S, allow_inf_nan=False)]
+AirVelocityPart = Annotated[float, Field(ge=-FASTEST_AIR_M_S, le=FASTEST_AIR_M_S, allow_inf_nan=False)]
+AirVelocity = tuple[AirVelocityPart, AirVelocityPart, AirVelocityPart]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 TWENTY_FEET_M = 6.096  # height at which MIL-F-8785C measures the wind that scales its low-altitude gusts
@@ -26,7 +30,7 @@ class ConstantWind(FileModel):
     """The same mean wind at every height."""
 
     kind: Literal["constant"] = "constant"
-    velocity_in_world_m_s: Annotated[Vector, Field(description="x east, y north, z up")]
+    velocity_in_world_m_s: Annotated[AirVelocity, Field(description="x east, y north, z up")]
 
     @property
     def w20_m_s(self) -> float:
@@ -38,7 +42,7 @@ class BoundaryLayer(FileModel):
     """Logarithmic profile over flat ground, v(z) = (v*/k) ln(z/z0) (Waslander & Wang 2009)."""
 
     kind: Literal["boundary_layer"] = "boundary_layer"
-    speed_at_10_m_m_s: NonNegative
+    speed_at_10_m_m_s: AirSpeed
     toward_deg: Annotated[Finite, Field(description="where the wind blows to: 0 = +x (east), 90 = +y (north)")]
     roughness_m: Annotated[float, Field(gt=0.0, le=2.0, description="z0; 0.05 m is short grass")] = 0.05
 
@@ -100,7 +104,7 @@ class JetSchedule(FileModel):
     """
 
     start_s: NonNegative = 0.0
-    end_s: Annotated[float | None, Field(description="never, when absent", allow_inf_nan=False)] = None
+    end_s: Annotated[float | None, Field(ge=0.0, le=1e9, description="never, when absent", allow_inf_nan=False)] = None
     edge_s: NonNegative = 0.3
 
     @model_validator(mode="after")
@@ -126,7 +130,7 @@ class JetSettings(FileModel):
     azimuth_deg: Annotated[Finite, Field(description="where it blows to: 0 = +x (east), 90 = +y (north)")]
     elevation_deg: Annotated[float, Field(ge=-90.0, le=90.0, description="positive blows upward")] = 0.0
     axis_speed: Annotated[
-        tuple[tuple[NonNegative, NonNegative], ...],
+        tuple[tuple[NonNegative, AirSpeed], ...],
         Field(min_length=1, description="pairs of distance from the nozzle [m] and speed on the axis [m/s]"),
     ]
     radial: Annotated[RadialTable | RadialGaussian, Field(discriminator="kind")]

@@ -1,0 +1,1 @@
+"""Fuzzing: seeded random inputs for everything that reads what others wrote. See `__main__`."""
