@@ -60,6 +60,11 @@ class HoveringLink:
         answers, self._answers = self._answers, []
         return (OdometrySample(now, zero, zero, level, zero), VehicleSample(now, self.mode, True, True), *answers)
 
+    async def wait_for_motion(self, timeout_s: float) -> bool:
+        """None comes by itself: it is there whenever somebody looks."""
+        await asyncio.sleep(timeout_s)
+        return False
+
     def send_text(self, severity: int, text: str) -> None:
         """Nobody listens."""
 

@@ -93,6 +93,8 @@ def summary_table(summary: dict[str, Any]) -> Table:
     table.add_row("mean wind force e/n/u", f"{force[0]:+.2f} {force[1]:+.2f} {force[2]:+.2f} m/s²")
     table.add_row("solver", _times(summary["solve_ms"]))
     table.add_row("whole cycle", _times(summary["cycle_ms"]))
+    if summary["latency_ms"] is not None:
+        table.add_row("motion to setpoint", _times(summary["latency_ms"]))
     gap = summary["setpoint_gap_max_s"]
     if gap is not None:
         table.add_row("setpoints", f"{summary['setpoint_rate_hz']:.1f} Hz, largest gap {gap * 1e3:.0f} ms")

@@ -5,18 +5,20 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import gc
+import math
 import signal
 import time
 from collections.abc import Callable, Coroutine, Iterator
 from pathlib import Path
 from typing import Any
 
+from uasfly.drivers.metronome import Metronome
 from uasfly.drivers.plan import FlightPlan
 from uasfly.drivers.watching import BackgroundWatch, Cycle, Watch
 from uasfly.errors import describe_error
 from uasfly.flight.pilot import Pilot, StepResult
 from uasfly.flight.summary import SummaryCollector
-from uasfly.link.protocol import VehicleLink
+from uasfly.link.protocol import LiveLink
 from uasfly.messages import FactsSample, Phase, Request, RequestKind, RequestResult, Sample, Setpoint, Status
 from uasfly.record.writer import BackgroundLogWriter
 
@@ -28,7 +30,7 @@ TOLD_SEVERITY = 5  # and worse: notice, warning, error ...
 async def fly(
     plan: FlightPlan,
     pilot: Pilot,
-    link: VehicleLink,
+    link: LiveLink,
     log: Path | None = None,
     watch: Watch | None = None,
     gather: Callable[[], Coroutine[Any, Any, FactsSample]] | None = None,
@@ -72,7 +74,7 @@ class _LiveFlight:
     """One flight with those who listen to it: summary, log and live view."""
 
     def __init__(
-        self, pilot: Pilot, link: VehicleLink, writer: BackgroundLogWriter | None, watch: BackgroundWatch | None
+        self, pilot: Pilot, link: LiveLink, writer: BackgroundLogWriter | None, watch: BackgroundWatch | None
     ) -> None:
         self.summary = SummaryCollector()
         self._pilot = pilot
@@ -104,13 +106,9 @@ class _LiveFlight:
                 self.summary.warn(self._watch.problem)
 
     async def _cycles(self, period_s: float) -> None:
-        deadline = time.monotonic()
+        metronome = Metronome(self._link, period_s)
         while not self._pilot.done:
-            deadline += period_s
-            now = time.monotonic()
-            if now > deadline + period_s:  # a cycle was missed: go on from here instead of hurrying after it
-                deadline = now
-            await asyncio.sleep(max(0.0, deadline - now))
+            await metronome.next()
             self._cycle()
 
     def _cycle(self) -> None:
@@ -149,7 +147,8 @@ class _LiveFlight:
         """A setpoint that has become old on its way here (the process was stopped) does not leave."""
         sent = self._link.send(setpoint)
         if sent:
-            self.summary.setpoint_sent(time.monotonic())
+            motion = self._pilot.view.odometry
+            self.summary.setpoint_sent(time.monotonic(), math.nan if motion is None else motion.time_s)
         else:
             self._pilot.announce(3, "a setpoint was too old to be sent: this computer or the process was stopped")
         return sent

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from array import array
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,11 @@ from uasfly.errors import FileError
 from uasfly.messages import Array, OdometrySample, Phase, PreflightCheck, Sample, Status, TruthSample
 
 KEPT_CYCLES = 256  # truth and GNSS samples are compared with cycles up to this long ago
+
+
+def _figures() -> array[float]:
+    """Figures of every cycle: eight bytes each, so that an hour of flight is some megabytes."""
+    return array("d")
 
 
 @dataclass(slots=True)
@@ -64,9 +71,10 @@ class SummaryCollector:
     _gnss: _SquareSum = field(default_factory=_SquareSum)
     _force_sum: Array = field(default_factory=lambda: np.zeros(3))
     _force_count: int = 0
-    _solve_ms: list[float] = field(default_factory=list)
-    _cycle_ms: list[float] = field(default_factory=list)
-    _setpoint_times_s: list[float] = field(default_factory=list)
+    _solve_ms: array[float] = field(default_factory=_figures)
+    _cycle_ms: array[float] = field(default_factory=_figures)
+    _latency_ms: array[float] = field(default_factory=_figures)
+    _setpoint_times_s: array[float] = field(default_factory=_figures)
     _fallbacks: dict[str, int] = field(default_factory=dict)
     _warnings: list[str] = field(default_factory=list)
     _preflight: list[dict[str, str]] = field(default_factory=list)
@@ -105,9 +113,11 @@ class SummaryCollector:
         """The flight was broken off outside of the step; `status` tells why, and nothing is computed from it."""
         self._phase, self._reason = status.phase, status.reason
 
-    def setpoint_sent(self, time_s: float) -> None:
-        """A setpoint has left at `time_s`."""
+    def setpoint_sent(self, time_s: float, motion_s: float = math.nan) -> None:
+        """A setpoint has left at `time_s`; `motion_s` is when the newest motion that it answers to was true."""
         self._setpoint_times_s.append(time_s)
+        if math.isfinite(motion_s):
+            self._latency_ms.append((time_s - motion_s) * 1e3)
 
     def preflight(self, checks: tuple[PreflightCheck, ...]) -> None:
         """The preflight check was made; of several the last counts."""
@@ -144,6 +154,7 @@ class SummaryCollector:
             "gnss_rms_m": _rounded(self._gnss.rms()),
             "solve_ms": _quantiles(self._solve_ms),
             "cycle_ms": _quantiles(self._cycle_ms),
+            "latency_ms": _quantiles(self._latency_ms),
             "setpoint_rate_hz": round(len(gaps) / span, 3) if span > 0.0 else 0.0,
             "setpoint_gap_max_s": round(float(gaps.max()), 4) if len(gaps) else None,
             "fallback_steps": sum(self._fallbacks.values()),
@@ -191,7 +202,7 @@ def _rounded(values: dict[str, float] | None) -> dict[str, float] | None:
     return None if values is None else {key: round(value, 5) for key, value in values.items()}
 
 
-def _quantiles(values: list[float]) -> dict[str, float] | None:
+def _quantiles(values: Sequence[float]) -> dict[str, float] | None:
     if not values:
         return None
     median, p99 = np.percentile(values, (50, 99)).tolist()

@@ -158,12 +158,14 @@ class Bridge:
         return True
 
     def reopen(self) -> None:
-        """Remove and add the connection: a serial port that went away does not come back by itself.
+        """Open the serial port anew: one that went away does not come back by itself.
+
+        The dead connection stays: MAVSDK 4.1 crashes now and then when a serial one is removed (the end of its pending
+        read is handled after the object is gone).
 
         Raises:
             LinkError: when it cannot be opened (yet).
         """
-        self._remove_connection()
         try:
             self._connection = self._mavsdk.add_any_connection_with_handle(self._url)
         except MavsdkConnectionError as error:
@@ -179,15 +181,11 @@ class Bridge:
             return
         self._closed = True
         self._direct = self._events = self._system = None
-        self._remove_connection()
+        if self._connection is not None and not self._url.startswith("serial"):  # see `reopen`
+            self._mavsdk.remove_connection(self._connection)
         destroyer = threading.Thread(target=self._mavsdk.destroy, name="mavsdk-destroy", daemon=True)
         destroyer.start()
         destroyer.join(DESTROY_PATIENCE_S)
-
-    def _remove_connection(self) -> None:
-        if self._connection is not None:
-            self._mavsdk.remove_connection(self._connection)
-            self._connection = None
 
     def _attach(self, system: System) -> None:
         self._system, self._system_id = system, int(system.get_system_id())

@@ -68,6 +68,8 @@ class MavsdkLink:
         self._echoes = EchoFilter()
         self._own_samples: list[TextSample | LinkSample] = []
         self._home: asyncio.Future[Array | None] | None = None
+        self._motion: asyncio.Future[bool] | None = None  # waits for the next ODOMETRY
+        self._motion_came = False
         self._text_ids = itertools.cycle(range(1, 0x10000))
         self._commands = CommandChannel(bridge.send, bridge.system_id)
         self._parameters = ParameterChannel(bridge.send, bridge.system_id)
@@ -84,7 +86,7 @@ class MavsdkLink:
         self._upkeep = Upkeep(bridge, url, self._time_sync, self._commands, heartbeats, want_truth, self._say)
         self._wake_up = WakeUp(asyncio.get_running_loop(), self._on_wake)
         for slot in self._sample_slots.values():
-            bridge.subscribe(slot, self._ring_if_awaited)
+            bridge.subscribe(slot, self._ring_for_motion if slot.name == "ODOMETRY" else self._ring_if_awaited)
         for slot, _ in self._service:
             bridge.subscribe(slot, self._wake_up.ring)
         if url.scheme != "serial" or url.baud >= EVENTS_MIN_BAUD:
@@ -208,6 +210,19 @@ class MavsdkLink:
         finally:
             self._awaited = False
 
+    async def wait_for_motion(self, timeout_s: float) -> bool:
+        """Wait until the next ODOMETRY arrives, at most so long [s]; whether one has."""
+        loop = asyncio.get_running_loop()
+        self._motion_came = False
+        motion: asyncio.Future[bool] = loop.create_future()
+        self._motion = motion
+        timer = loop.call_later(timeout_s, _settle, motion, False)
+        try:
+            return await motion
+        finally:
+            timer.cancel()
+            self._motion = None
+
     def send_text(self, severity: int, text: str) -> None:
         """Send a status text; PX4 relays it to the ground station.
 
@@ -309,7 +324,17 @@ class MavsdkLink:
         if self._awaited:
             self._wake_up.ring()
 
+    def _ring_for_motion(self) -> None:
+        """From MAVSDK's thread: a control cycle waits for this one."""
+        if self._motion is not None:
+            self._motion_came = True
+            self._wake_up.ring()
+        else:
+            self._ring_if_awaited()
+
     def _on_wake(self) -> None:
+        if self._motion is not None and self._motion_came:
+            _settle(self._motion, True)
         if not self._closed:
             self._serve()
             if self._something_waits():
@@ -348,3 +373,8 @@ class MavsdkLink:
 
 def _arrival(item: tuple[float, str, str]) -> float:
     return item[0]
+
+
+def _settle(answer: asyncio.Future[bool], came: bool) -> None:
+    if not answer.done():
+        answer.set_result(came)

@@ -23,6 +23,35 @@ def check_available(url: ConnectionUrl) -> None:
         _check_device(url)
 
 
+class DeviceWatch:
+    """Notices that a serial device has been replaced since it was opened: pulled and put in again, or re-enumerated.
+
+    Only then is its connection to be opened anew: each opening leaves a dead connection behind, see `Bridge.reopen`.
+    """
+
+    def __init__(self, device: str) -> None:
+        self._device = Path(device)
+        self._opened = self._identity()
+
+    def replaced(self) -> bool:
+        """Whether another device is there now; False while there is none."""
+        now = self._identity()
+        if now is None:
+            self._opened = None
+        return now is not None and now != self._opened
+
+    def opened(self) -> None:
+        """The device that is there now has been opened."""
+        self._opened = self._identity()
+
+    def _identity(self) -> tuple[int, ...] | None:
+        try:
+            found = self._device.stat()
+        except OSError:
+            return None
+        return found.st_dev, found.st_ino, found.st_rdev
+
+
 def _check_bind(url: ConnectionUrl) -> None:
     kind = socket.SOCK_DGRAM if url.scheme == "udpin" else socket.SOCK_STREAM
     with socket.socket(socket.AF_INET, kind) as probe:

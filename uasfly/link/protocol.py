@@ -55,3 +55,11 @@ class InspectedLink(VehicleLink, Protocol):
     def round_trip_s(self) -> float:
         """Smallest recent TIMESYNC round trip [s]; NaN before the first answer."""
         ...
+
+
+class LiveLink(VehicleLink, Protocol):
+    """What a driver in real time needs beside that."""
+
+    async def wait_for_motion(self, timeout_s: float) -> bool:
+        """Wait until the next motion sample arrives, at most so long [s]; whether one has."""
+        ...

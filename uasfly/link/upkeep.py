@@ -11,7 +11,7 @@ from typing import Any
 from uasfly.errors import LinkError
 from uasfly.link.bridge import Bridge
 from uasfly.link.commands import CommandChannel
-from uasfly.link.ports import check_available
+from uasfly.link.ports import DeviceWatch, check_available
 from uasfly.link.slots import Slot
 from uasfly.link.streams import ask_for_streams
 from uasfly.link.timesync import TimeSync
@@ -55,6 +55,7 @@ class Upkeep:
         self._heartbeats = heartbeats
         self._want_truth = want_truth
         self._say = say
+        self._device = DeviceWatch(url.device) if url.scheme == "serial" else None
         self._tasks: set[asyncio.Task[None]] = set()
         self._stream_task: asyncio.Task[None] | None = None
 
@@ -113,15 +114,16 @@ class Upkeep:
         since_reopening_s = 0.0
         step_s = 0.1
         while self._heartbeats.received == received:
-            if self._url.scheme == "serial" and since_reopening_s <= 0.0:
+            if self._device is not None and self._device.replaced() and since_reopening_s <= 0.0:
                 since_reopening_s = REOPEN_INTERVAL_S
-                self._reopen()
+                self._reopen(self._device)
             await asyncio.sleep(step_s)
             since_reopening_s -= step_s
 
-    def _reopen(self) -> None:
+    def _reopen(self, device: DeviceWatch) -> None:
         try:
             check_available(self._url)
             self._bridge.reopen()
+            device.opened()
         except LinkError as error:
             _log.debug("%s", error)
