@@ -79,7 +79,7 @@ class FakeObserver:
 
     def diagnose(self, time_s: float, window_s: float) -> Diagnosis:
         """All is well."""
-        return Diagnosis(np.full(3, 0.01), np.full(3, 0.01), {}, {}, 0.0, -math.inf, 0.0, 0.0, 0)
+        return Diagnosis(np.full(3, 0.01), np.full(3, 0.01), {}, {}, 0.0, -math.inf, 0.0, True, 0.0, 0)
 
     def estimate(self, time_s: float) -> StateEstimate | None:
         """The truth."""

@@ -42,7 +42,7 @@ def odometry_inputs(core: Array, rng: np.random.Generator) -> Array:
     inputs[s.IN_USE] = 1.0
     inputs[s.IN_CORRELATION] = (1.0, 3.0, 2.0)
     inputs[s.IN_VARIANCE] = VARIANCES
-    inputs[s.IN_WEIGHTS] = (0.01, 0.01, 0.04, 1.0)
+    inputs[s.IN_WEIGHTS] = (0.01, 0.01, 0.04, 1.0, 1.0)
     return inputs
 
 

@@ -25,6 +25,7 @@ class Diagnosis:
         nis_mean: mean normalised innovation squared over its degrees of freedom; about 1 or less when consistent.
         jump_m, jump_s: size and time of the last step of the measured position that was taken as an error of GNSS.
         drift_m_s: speed at which the measured position runs away from the velocity, mean over a second.
+        agrees: whether measured position and velocity tell the same motion.
         blind_s: time since a position or a marker was accepted.
         restarts: times that the filter started again.
     """
@@ -36,6 +37,7 @@ class Diagnosis:
     jump_m: float
     jump_s: float
     drift_m_s: float
+    agrees: bool
     blind_s: float
     restarts: int
 
@@ -104,7 +106,9 @@ class Journal:
                 return self._biases[k - 1][1:]
         return self._biases[0][1:]
 
-    def diagnose(self, time_s: float, moment: Moment, window_s: float, drift_m_s: float, restarts: int) -> Diagnosis:
+    def diagnose(
+        self, time_s: float, moment: Moment, window_s: float, drift_m_s: float, agrees: bool, restarts: int
+    ) -> Diagnosis:
         """The diagnosis at a time; the window must be the same in every call."""
         for tally in self._tallies.values():
             tally.forget_before(time_s - window_s)
@@ -123,6 +127,7 @@ class Journal:
             jump_m=self._jump[0],
             jump_s=self._jump[1],
             drift_m_s=drift_m_s,
+            agrees=agrees,
             blind_s=time_s - self._seen_s,
             restarts=restarts,
         )

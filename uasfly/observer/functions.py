@@ -21,7 +21,6 @@ from uasfly.observer import update as up
 # A sensor whose mean innovation exceeds this many configured sigmas has jumped; the state then follows it at about this
 # speed (see `_recovery`), in the order of states.SENSORS: rad/s, m/s, m/s^2.
 JUMP_SIGMAS = 3.0
-DOUBT_SIGMAS = 0.6  # a mean innovation beyond this is no chance either: the other sensor sees something too
 RECOVERY_RATES = (1.0, 50.0, 30.0)  # the position's goes into the GNSS bias, which nothing flies by; a gust is fast
 
 
@@ -97,11 +96,11 @@ def odometry_step(markers: int) -> ca.Function:
         block = packed[layout.matched][9 * sensor : 9 * sensor + 9]
         mean = packed[layout.mean][3 * sensor : 3 * sensor + 3]
         state = _Sensor(sensor, up.symmetric(ca.reshape(block, 3, 3)), mean, inputs)
-        other = _other_jumped(packed, inputs, layout, sensor)
-        covariance = covariance + _recovery(state, other, layout)
+        motion = _is_motion(inputs, sensor)
+        covariance = covariance + _recovery(state, motion, layout)
         free = inputs[s.IN_BIAS_FREE]
         if sensor == s.POSITION_SENSOR:
-            free = ca.fmax(free, state.jumped * (1.0 - other))
+            free = ca.fmax(free, state.jumped * (1.0 - motion))
         allowed = _held_bias(free, layout)
         jacobian = ca.horzcat(me.odometry_jacobian(core, sensor), ca.SX(3, layout.errors - s.CORE_ERROR))
         residual = innovations[sensor] - ca.mtimes(jacobian, error)
@@ -113,7 +112,7 @@ def odometry_step(markers: int) -> ca.Function:
         )
         error = error + ca.mtimes(gain, residual)
         # what contradicts everything else is no noise, and must not talk itself in as such
-        weight = state.use * inputs[s.IN_MATCHING_WEIGHT] * (1.0 - state.jumped * (1.0 - other))
+        weight = state.use * inputs[s.IN_MATCHING_WEIGHT] * (1.0 - state.jumped * (1.0 - motion))
         matched.append(ca.vec(up.matched_covariance(state.matched, state.noise, inverse, shortened, weight)))
         told = shortened * (1.0 - passed) if sensor == s.POSITION_SENSOR else shortened
         means.append(mean + state.use * inputs[s.IN_MEAN_WEIGHT] * (told - mean))
@@ -155,28 +154,29 @@ def _held_bias(free: ca.SX, layout: s.Layout) -> ca.SX:
     return allowed
 
 
-def _other_jumped(packed: ca.SX, inputs: ca.SX, layout: s.Layout, sensor: int) -> ca.SX:
-    """1 where the velocity disagrees, seen from the position, and the other way round; a sensor that is off counts.
+def _is_motion(inputs: ca.SX, sensor: int) -> ca.SX:
+    """1 where what a sensor says against the model is the vehicle's motion, not the sensor's error.
 
-    Both at once is the vehicle: pushed harder than the model can explain. One alone is that sensor's error.
+    Position and velocity vouch for each other (see `agreement`); a velocity without a position is believed.
     """
-    other = {s.POSITION_SENSOR: s.VELOCITY_SENSOR, s.VELOCITY_SENSOR: s.POSITION_SENSOR}.get(sensor)
-    if other is None:
-        return ca.SX(1.0)
-    mean = packed[layout.mean][3 * other : 3 * other + 3]
-    jumped = ca.dot(mean, mean) > DOUBT_SIGMAS**2 * inputs[s.IN_VARIANCE][other]
-    return jumped if sensor == s.POSITION_SENSOR else ca.fmax(jumped, 1.0 - inputs[s.IN_USE][other])
+    match sensor:
+        case s.POSITION_SENSOR:
+            return inputs[s.IN_AGREES]
+        case s.VELOCITY_SENSOR:
+            return ca.fmax(inputs[s.IN_AGREES], 1.0 - inputs[s.IN_USE][s.POSITION_SENSOR])
+        case _:
+            return ca.SX(1.0)
 
 
-def _recovery(sensor: _Sensor, other_jumped: ca.SX, layout: s.Layout) -> ca.SX:
+def _recovery(sensor: _Sensor, motion: ca.SX, layout: s.Layout) -> ca.SX:
     """Noise (n, n) that lets the state follow a sensor that has jumped and stays there.
 
     After a jump by e the matched R is about e e'. A state with process noise q then closes the gap at e / tau,
     tau = sqrt(r / q), r = R dt: with q = rate^2 dt that is `rate`, whatever the size of the jump and the sample rate.
     So the estimate glides to the new place instead of stepping there, and a jump that returns soon has hardly moved it.
-    A jump of the position alone is GNSS's: the noise goes to the bias, which is free meanwhile, so that it takes the
-    jump. There the mean counts only innovations outside the gate: what the filter expected (after silence) is no jump.
-    A velocity that jumps alone is not followed: the position contradicts it.
+    A jump of the position that is no motion is GNSS's: the noise goes to the bias, which is free meanwhile, so that it
+    takes the jump. There the mean counts only innovations outside the gate: what the filter expected (after silence) is
+    no jump. A velocity that is no motion is not followed.
     """
     rate = sensor.interval * RECOVERY_RATES[sensor.index]
     variance = sensor.use * sensor.jumped * rate**2 * sensor.correlation
@@ -185,9 +185,9 @@ def _recovery(sensor: _Sensor, other_jumped: ca.SX, layout: s.Layout) -> ca.SX:
         case s.ATTITUDE_SENSOR:
             diagonal[s.D_ATTITUDE] = variance
         case s.POSITION_SENSOR:
-            diagonal[s.D_BIAS] = variance * (1.0 - other_jumped)
+            diagonal[s.D_BIAS] = variance * (1.0 - motion)
         case _:
-            diagonal[s.D_VELOCITY] = variance * other_jumped
+            diagonal[s.D_VELOCITY] = variance * motion
     return ca.sparsify(ca.diag(diagonal))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from uasfly.messages import Array
@@ -41,6 +42,13 @@ class Moment:
     def layout(self) -> s.Layout:
         """How `packed` is laid out."""
         return s.Layout(len(self.markers))
+
+    @property
+    def position_sigma_m(self) -> float:
+        """Standard deviation of the measured position's noise, as matched; mean of the axes."""
+        start = self.layout.matched.start + 9 * s.POSITION_SENSOR
+        total: float = sum(self.packed[start : start + 9 : 4].tolist())
+        return math.sqrt(max(0.0, total) / 3.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from uasfly.messages import (
     VehicleSample,
 )
 from uasfly.observer import states as s
+from uasfly.observer.agreement import Agreement
 from uasfly.observer.diagnosis import Diagnosis, Journal
 from uasfly.observer.door import Odometry, Sighting, checked_odometry, checked_sighting
 from uasfly.observer.gnss import DriftWatch, Outage
@@ -81,6 +82,7 @@ class Observer:
         self._timeline: Timeline | None = None
         self._journal = Journal()
         self._drift = DriftWatch(airframe.observer.gnss_bias_density)
+        self._agreement = Agreement()
         self._outage = Outage(airframe.observer.velocity_sigma_m_s)
         self._in_air = False
         self._in_air_s = -math.inf
@@ -167,7 +169,8 @@ class Observer:
         moment = self.moment
         if moment is None:
             raise LookupError("the observer has nothing to diagnose before the first odometry sample")
-        return self._journal.diagnose(time_s, moment, window_s, self._drift.speed_m_s, self.counters.restarts)
+        drift_m_s, agrees = self._drift.speed_m_s, self._agreement.agrees
+        return self._journal.diagnose(time_s, moment, window_s, drift_m_s, agrees, self.counters.restarts)
 
     @property
     def moment(self) -> Moment | None:
@@ -212,6 +215,9 @@ class Observer:
         else:
             self._dropped_from_s = None
             if time_s >= newest_s:
+                if isinstance(measured, Odometry):
+                    self._agreement.look(measured, timeline.newest.position_sigma_m)
+                    self._stepper.agrees = self._agreement.agrees
                 verdicts = timeline.append(time_s, measured, self._in_air)
                 self._note(time_s, verdicts)
                 if isinstance(measured, Odometry):

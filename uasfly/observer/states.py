@@ -118,9 +118,10 @@ IN_INTERVAL = 32  # s since the sample before
 IN_MATCHING_WEIGHT = 33  # 0..1, weight of this innovation in the matched covariance
 IN_MEAN_WEIGHT = 34  # 0..1, weight of this innovation in the mean innovation
 IN_BIAS_FREE = 35  # 1 while a marker makes the GNSS bias observable, else 0
-ODOMETRY_INPUTS = 36
+IN_AGREES = 36  # 1 while measured position and velocity tell the same motion, else 0
+ODOMETRY_INPUTS = 37
 IN_MEASURED = slice(13, 29)  # quaternion, position, velocity, use, correlation
-IN_WEIGHTS = slice(32, 36)  # interval, matching weight, mean weight, bias free
+IN_WEIGHTS = slice(32, 37)  # interval, matching weight, mean weight, bias free, agrees
 
 # Output of an odometry step beside the new packed state.
 OUT_NIS = slice(0, 3)  # normalised innovation squared

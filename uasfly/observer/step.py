@@ -46,6 +46,7 @@ class Stepper:
         self._thrust = thrust
         self._noise = noise
         self.bias_free = False  # whether GNSS runs away from everything else: its bias takes what it says
+        self.agrees = True  # whether measured position and velocity tell the same motion
         self._window_s = noise.matching_window_s
         self._correlations_s = (
             noise.attitude_correlation_s,
@@ -163,6 +164,7 @@ class Stepper:
             self._matching_weight(counted_s),
             1.0 - math.exp(-counted_s / MEAN_TIME_S),
             bias_free,
+            self.agrees,
         )
         result = np.empty(packed.size)
         self._odometry_steps[len(before.markers)]((packed, inputs), (result, self._outputs))

@@ -101,7 +101,7 @@ def diagnosis(rejected: dict[str, float] | None = None, nis: dict[str, float] | 
     """An observer that is content."""
     shares = {"position": 0.0, "velocity": 0.0, "attitude": 0.0} | (rejected or {})
     errors = {"position": 0.7, "velocity": 1.1, "attitude": math.nan} | (nis or {})
-    return Diagnosis(ZERO, ZERO, shares, errors, 0.0, -math.inf, 0.0, 0.0, 0)
+    return Diagnosis(ZERO, ZERO, shares, errors, 0.0, -math.inf, 0.0, True, 0.0, 0)
 
 
 def gathered(**changes: Any) -> Gathered:

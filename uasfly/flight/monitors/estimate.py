@@ -24,13 +24,12 @@ class UncertainEstimate:
             return f"position known to {position:.2f} m only"
         if not velocity <= settings.velocity_sigma_m_s:
             return f"velocity known to {velocity:.2f} m/s only"
-        # A position that is refused is an error of GNSS and has its own monitors; position and velocity refused
-        # together are a gust that pushes harder than the model can explain.
+        # A position that is refused is an error of GNSS and has its own monitors. A velocity that is refused although
+        # the position agrees with it is a gust that pushes harder than the model can explain.
         shares = diagnosis.rejected_share
-        pushed = shares.get("position", 0.0) > 0.5 * shares.get("velocity", 0.0)
         for sensor in ("velocity", "attitude"):
             share = shares.get(sensor, 0.0)
-            if share > settings.rejected_share and not (sensor == "velocity" and pushed):
+            if share > settings.rejected_share and not (sensor == "velocity" and diagnosis.agrees):
                 return f"{share * 100.0:.0f} % of PX4's {sensor} contradicts the estimate"
         return ""
 
