@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import select
 import signal
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -46,6 +48,9 @@ class LiveFlight:
         self.log, self.summary = folder / "flight.mcap", folder / "summary.json"
         self.text = ""
         self.vehicle_pid = 0
+        self.exit_code: int | None = None
+        self.vehicle_gone = False
+        self.killed_s = math.nan
 
     def wait_for(self, text: str) -> None:
         """Wait until uasfly has said something."""
@@ -130,13 +135,49 @@ def _flight(folder: Path, hover_s: float) -> Iterator[LiveFlight]:
         process.stderr.close()
 
 
-@pytest.mark.slow
-def test_a_flight_over_mavlink_completes_and_leaves_nothing_behind(tmp_path: Path) -> None:
-    """Outcome, log and summary are whole; the vehicle has landed and its process is gone."""
-    with _flight(tmp_path, hover_s=3.0) as flight:
+def _complete(folder: Path) -> LiveFlight:
+    with _flight(folder, hover_s=3.0) as flight:
         flight.wait_for("phase legs")
-        assert flight.wait() == 0, flight.text
-        assert flight.vehicle_is_gone()
+        flight.exit_code = flight.wait()
+        flight.vehicle_gone = flight.vehicle_is_gone()
+    return flight
+
+
+def _interrupt(folder: Path) -> LiveFlight:
+    with _flight(folder, hover_s=100.0) as flight:
+        flight.wait_for("phase legs")
+        flight.process.send_signal(signal.SIGINT)
+        flight.exit_code = flight.wait()
+        flight.vehicle_gone = flight.vehicle_is_gone()
+    return flight
+
+
+def _kill(folder: Path) -> LiveFlight:
+    with _flight(folder, hover_s=100.0) as flight:
+        flight.wait_for("phase legs")
+        time.sleep(2.0)
+        flight.killed_s = time.monotonic()
+        flight.process.kill()
+        flight.vehicle_gone = flight.vehicle_is_gone()
+        flight.exit_code = flight.wait()
+    return flight
+
+
+@pytest.fixture(scope="module")
+def flights(tmp_path_factory: pytest.TempPathFactory) -> dict[str, LiveFlight]:
+    """Three flights at the same time, because they take as long as they take."""
+    scripts = {"completed": _complete, "interrupted": _interrupt, "killed": _kill}
+    with ThreadPoolExecutor(len(scripts)) as threads:
+        futures = {name: threads.submit(fly, tmp_path_factory.mktemp(name)) for name, fly in scripts.items()}
+        return {name: future.result() for name, future in futures.items()}
+
+
+@pytest.mark.slow
+def test_a_flight_over_mavlink_completes_and_leaves_nothing_behind(flights: dict[str, LiveFlight]) -> None:
+    """Outcome, log and summary are whole; the vehicle has landed and its process is gone."""
+    flight = flights["completed"]
+    assert flight.exit_code == 0, flight.text
+    assert flight.vehicle_gone
     assert "Traceback" not in flight.text
     summary = flight.result()
     assert (summary["outcome"], summary["reason"]) == ("completed", "")
@@ -158,13 +199,11 @@ def test_a_flight_over_mavlink_completes_and_leaves_nothing_behind(tmp_path: Pat
 
 
 @pytest.mark.slow
-def test_an_interrupt_in_the_legs_holds_and_lands(tmp_path: Path) -> None:
+def test_an_interrupt_in_the_legs_holds_and_lands(flights: dict[str, LiveFlight]) -> None:
     """Ctrl-C once: hold, land, aborted with the reason; log and summary are whole, nothing is left running."""
-    with _flight(tmp_path, hover_s=100.0) as flight:
-        flight.wait_for("phase legs")
-        flight.process.send_signal(signal.SIGINT)
-        assert flight.wait() == 1, flight.text
-        assert flight.vehicle_is_gone()
+    flight = flights["interrupted"]
+    assert flight.exit_code == 1, flight.text
+    assert flight.vehicle_gone
     assert "Traceback" not in flight.text
     assert "stopped by Ctrl-C: holding, then land" in flight.text
     summary = flight.result()
@@ -179,17 +218,13 @@ def test_an_interrupt_in_the_legs_holds_and_lands(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_killed_uasfly_leaves_its_log_and_no_vehicle(tmp_path: Path) -> None:
+def test_a_killed_uasfly_leaves_its_log_and_no_vehicle(flights: dict[str, LiveFlight]) -> None:
     """SIGKILL in the legs: the log reads up to the last second, and the simulated vehicle's process goes by itself."""
-    with _flight(tmp_path, hover_s=100.0) as flight:
-        flight.wait_for("phase legs")
-        time.sleep(2.0)
-        killed_s = time.monotonic()
-        flight.process.kill()
-        assert flight.vehicle_is_gone()
-        assert flight.wait() == -signal.SIGKILL
+    flight = flights["killed"]
+    assert flight.exit_code == -signal.SIGKILL
+    assert flight.vehicle_gone
     assert not flight.is_complete()
     last = flight.messages(Status)[-1]
     assert last.phase is Phase.LEGS
-    assert last.time_s >= killed_s - LAST_SECOND_S - STARVED_S
+    assert last.time_s >= flight.killed_s - LAST_SECOND_S - STARVED_S
     assert not flight.summary.exists()
