@@ -56,6 +56,17 @@ async def test_samples_carry_the_hosts_time_of_when_they_were_true(pair: Pair) -
     assert "ODOMETRY unusable" not in link.losses()
 
 
+async def test_a_cycle_can_wait_for_motion(pair: Pair) -> None:
+    """It is told of the next ODOMETRY, not of one that waits already, and of silence after the time-out."""
+    link, vehicle = pair
+    await until(link, lambda got: any(isinstance(sample, OdometrySample) for sample in got))
+    assert await link.wait_for_motion(10.0)
+    assert any(isinstance(sample, OdometrySample) for sample in link.poll())
+    vehicle.silent = True
+    await asyncio.sleep(0.3)  # what is on its way arrives, and waits
+    assert not await link.wait_for_motion(0.1)
+
+
 async def test_mode_and_truth_come_through(pair: Pair) -> None:
     """HEARTBEAT makes a VehicleSample, the truth array a TruthSample in its own frames."""
     link, vehicle = pair

@@ -324,7 +324,7 @@ class Sequencer:
         if self.phase not in (Phase.TAKEOFF, Phase.ENGAGE, Phase.LEGS, Phase.ENDING):
             self.silence = Silence(self.telemetry)
             return
-        lasted, texts = self.silence.update(time_s, view.odometry_age_s(time_s), view.heartbeat_s)
+        lasted, texts = self.silence.update(time_s, view.odometry_age_s(time_s), view.heartbeat_s, self.streaming)
         self.announcements += texts
         if lasted is not None and self.phase is Phase.LEGS:
             if lasted <= self.telemetry.resume_within_s:

@@ -30,13 +30,16 @@ class Silence:
         self._last_s: float | None = None
         self._heartbeat_lost = False
 
-    def update(self, time_s: float, age_s: float, heartbeat_s: float) -> tuple[float | None, list[tuple[int, str]]]:
+    def update(
+        self, time_s: float, age_s: float, heartbeat_s: float, streaming: bool
+    ) -> tuple[float | None, list[tuple[int, str]]]:
         """One cycle.
 
         Args:
             time_s: now.
             age_s: of the last odometry.
             heartbeat_s: time of the last heartbeat, NaN before the first.
+            streaming: whether setpoints are being sent, which now stop.
 
         Returns:
             How long a silence that has just ended has lasted [s], else None; and what is to be announced.
@@ -56,7 +59,8 @@ class Silence:
             self.stale, self._fresh_s = False, time_s
         elif not self.stale:
             self.stale = True
-            texts.append((ERROR, f"telemetry is {age_s:.1f} s old: no setpoints until it is back"))
+            stops = ": no setpoints until it is back" if streaming else ""
+            texts.append((ERROR, f"telemetry is {age_s:.1f} s old{stops}"))
         self._last_s = time_s
         self._watch_heartbeat(time_s, heartbeat_s, texts)
         return lasted, texts
