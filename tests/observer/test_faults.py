@@ -190,6 +190,24 @@ def test_without_any_telemetry_the_uncertainty_grows_with_the_error() -> None:
     assert np.linalg.norm(errors.position[-50:], axis=1).max() < 0.02
 
 
+@pytest.mark.parametrize("moved_m", [-6.0, 1.0, 4.0])
+def test_after_a_silence_the_vehicle_is_where_the_position_says(moved_m: float) -> None:
+    """Somebody else has flown it meanwhile, farther than the model can think: found again, and no error of GNSS."""
+    flight, observer = recording(), flying_observer()
+    end_s = START_S + 1.5
+
+    def silent_then_moved(sample: OdometrySample) -> Iterable[OdometrySample]:
+        if sample.time_s < START_S:
+            return (sample,)
+        return moved(moved_m)(sample) if sample.time_s > end_s else ()
+
+    errors = replay(observer, flight, silent_then_moved)
+    left = errors.position[-20:] - moved_m * EAST
+    assert np.linalg.norm(left, axis=1).max() < 0.1
+    assert np.linalg.norm(errors.estimates[-1].gnss_bias_in_world - flight.bias[-1]) < 0.1
+    assert observer.diagnose(flight.duration_s).jump_m == 0.0
+
+
 def test_a_sensor_that_is_noisier_than_configured_is_found_out() -> None:
     """Velocity noise three times the configured one: the matched sigma follows, and rejections become rare."""
     rng = np.random.default_rng(0)

@@ -12,7 +12,7 @@ from collections import deque
 
 from uasfly.observer.door import Odometry
 
-WINDOW_S = 1.0
+WINDOW_S = 2.0  # longer than the bias takes for a jump of many metres
 SPACING_S = 0.04  # of what is remembered: the window is looked through with every sample
 APART_M = 0.12  # the velocity's own wander over the window, and the steps of PX4's corrections
 NOISE_SIGMAS = 3.0  # of the position, on top

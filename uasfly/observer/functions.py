@@ -20,8 +20,9 @@ from uasfly.observer import update as up
 
 # A sensor whose mean innovation exceeds this many configured sigmas has jumped; the state then follows it at about this
 # speed (see `_recovery`), in the order of states.SENSORS: rad/s, m/s, m/s^2.
-JUMP_SIGMAS = 3.0
+JUMP_SIGMAS = 2.0
 RECOVERY_RATES = (1.0, 50.0, 30.0)  # the position's goes into the GNSS bias, which nothing flies by; a gust is fast
+FOLLOW_RATE_M_S = 3.0  # the state's way back to a position that it has lost
 
 
 class Caller:
@@ -107,9 +108,12 @@ def odometry_step(markers: int) -> ca.Function:
         expected = ca.mtimes(ca.mtimes(jacobian, covariance), jacobian.T)
         value, passed, inverse = up.innovation_test(residual, expected, state.noise, state.use)
         shortened = ca.sqrt(up.GATE_3 / ca.fmax(value, up.GATE_3)) * residual
-        gain, covariance = up.joseph_update(
-            covariance, jacobian, inputs[s.IN_CORRELATION][sensor] * state.noise, passed * allowed
-        )
+        used = inputs[s.IN_CORRELATION][sensor] * state.noise
+        taken = passed
+        if sensor == s.POSITION_SENSOR:  # the state has lost its place: back to the measured one, but not in one step
+            lost = state.use * state.jumped * motion * (1.0 - passed)
+            used, taken = used + lost * ca.dot(residual, residual) * ca.SX.eye(3), passed + lost
+        gain, covariance = up.joseph_update(covariance, jacobian, used, taken * allowed)
         error = error + ca.mtimes(gain, residual)
         # what contradicts everything else is no noise, and must not talk itself in as such
         weight = state.use * inputs[s.IN_MATCHING_WEIGHT] * (1.0 - state.jumped * (1.0 - motion))
@@ -117,7 +121,7 @@ def odometry_step(markers: int) -> ca.Function:
         told = shortened * (1.0 - passed) if sensor == s.POSITION_SENSOR else shortened
         means.append(mean + state.use * inputs[s.IN_MEAN_WEIGHT] * (told - mean))
         nis.append(value)
-        accepted.append(passed)
+        accepted.append(taken)
         residuals.append(residual)
     nominal, covariance = _inject(nominal, covariance, error)
     result = ca.vertcat(nominal, ca.vec(covariance), *matched, *means)
@@ -176,7 +180,8 @@ def _recovery(sensor: _Sensor, motion: ca.SX, layout: s.Layout) -> ca.SX:
     So the estimate glides to the new place instead of stepping there, and a jump that returns soon has hardly moved it.
     A jump of the position that is no motion is GNSS's: the noise goes to the bias, which is free meanwhile, so that it
     takes the jump. There the mean counts only innovations outside the gate: what the filter expected (after silence) is
-    no jump. A velocity that is no motion is not followed.
+    no jump. One that is motion is where the vehicle is: the state has lost it (in a silence), and glides back to it.
+    A velocity that is no motion is not followed.
     """
     rate = sensor.interval * RECOVERY_RATES[sensor.index]
     variance = sensor.use * sensor.jumped * rate**2 * sensor.correlation
@@ -186,6 +191,8 @@ def _recovery(sensor: _Sensor, motion: ca.SX, layout: s.Layout) -> ca.SX:
             diagonal[s.D_ATTITUDE] = variance
         case s.POSITION_SENSOR:
             diagonal[s.D_BIAS] = variance * (1.0 - motion)
+            follow = sensor.interval * FOLLOW_RATE_M_S
+            diagonal[s.D_POSITION] = sensor.use * sensor.jumped * motion * follow**2 * sensor.correlation
         case _:
             diagonal[s.D_VELOCITY] = variance * motion
     return ca.sparsify(ca.diag(diagonal))
