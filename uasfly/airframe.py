@@ -42,6 +42,17 @@ class ModelParameters(FileModel):
     roll: FirstOrder
     pitch: FirstOrder
     command_delay_s: Annotated[float, Field(ge=0.0, le=0.3, description="dead time from setpoint to response")]
+    thrust_delay_s: Annotated[
+        float | None,
+        Field(
+            ge=0.0, le=0.3, description="the same of the thrust, which is not behind an attitude loop, where it differs"
+        ),
+    ] = None
+
+    @property
+    def thrust_acts_after_s(self) -> float:
+        """Dead time of the thrust [s]."""
+        return self.command_delay_s if self.thrust_delay_s is None else self.thrust_delay_s
 
     @property
     def hover_thrust(self) -> float:

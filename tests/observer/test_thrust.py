@@ -3,6 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.observer.airframes import f550
+from uasfly.airframe import GRAVITY_M_S2
+from uasfly.observer.step import hover_thrust_history
 from uasfly.observer.thrust import ThrustHistory
 
 
@@ -54,3 +57,15 @@ def test_a_long_flight_keeps_the_recent_past_only() -> None:
         history.add(0.02 * k, float(k))
     assert history.mean(599.0, 599.02) == pytest.approx(29948.0, abs=1.0)
     assert len(history._entries) < 1000
+
+
+def test_thrust_acts_after_its_own_delay() -> None:
+    """Where the airframe file gives one; else after the common one."""
+    airframe = f550()
+    model = airframe.model
+    for delay, expected in ((None, model.command_delay_s), (0.02, 0.02)):
+        own = airframe.model_copy(update={"model": model.model_copy(update={"thrust_delay_s": delay})})
+        history = hover_thrust_history(own)
+        history.add(1.0, 12.0)
+        assert history.mean(1.0, 1.0 + expected) == pytest.approx(GRAVITY_M_S2)
+        assert history.mean(1.0 + expected, 2.0) == pytest.approx(12.0)

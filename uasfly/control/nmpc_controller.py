@@ -9,7 +9,7 @@ import numpy as np
 from uasfly.airframe import Airframe
 from uasfly.control.authority import holdable_force, nearby
 from uasfly.control.backup import PositionPid
-from uasfly.control.delay import LONGEST_PREDICTION_S, DelayPredictor, state_of
+from uasfly.control.delay import LONGEST_PREDICTION_S, DelayPredictor, inputs_of, state_of
 from uasfly.control.iteration import RealTimeIteration
 from uasfly.control.parts import Attitude, SetpointGuard, all_finite
 from uasfly.control.problem import problem_from_airframe
@@ -86,7 +86,7 @@ class NmpcController:
         self._yaw.reset(None if setpoint is None else setpoint.yaw_rad)
         self._backup.reset()
         self._fallback, self._time_s = "", None
-        self._commanded = None if setpoint is None else _inputs_of(setpoint)
+        self._commanded = None if setpoint is None else np.array(inputs_of(setpoint))
 
     def step(
         self, time_s: float, estimate: StateEstimate, reference_at: ReferenceAt, battery_voltage_v: float | None
@@ -114,7 +114,7 @@ class NmpcController:
         text = self._announce(fallback, status)
         setpoint = self._guard.setpoint(time_s, inputs, yaw, yaw_rate)
         self._delay.sent(setpoint)
-        self._commanded = _inputs_of(setpoint)
+        self._commanded = np.array(inputs_of(setpoint))
         planned = fallback != "backup"
         return ControlResult(
             setpoint=setpoint,
@@ -196,7 +196,3 @@ class NmpcController:
             return "the solver flies again"
         flies = "the last plan flies on" if fallback == "plan" else "the backup PIDs fly"
         return f"{_REASONS[status]}: {flies}"
-
-
-def _inputs_of(setpoint: Setpoint) -> Array:
-    return np.array((setpoint.thrust, setpoint.roll_rad, setpoint.pitch_rad))

@@ -240,7 +240,7 @@ def correlation_factor(interval_s: float, correlation_s: float) -> float:
 
 def hover_thrust_history(airframe: Airframe) -> ThrustHistory:
     """Empty thrust history of an airframe: before the first command it hovers."""
-    return ThrustHistory(airframe.model.command_delay_s, GRAVITY_M_S2)
+    return ThrustHistory(airframe.model.thrust_acts_after_s, GRAVITY_M_S2)
 
 
 def _without_force(moment: Moment) -> Array:
