@@ -23,7 +23,8 @@ from uasfly.errors import LinkError
 from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot
 from uasfly.flight.preflight import PARAMETERS
-from uasfly.messages import Array, FactsSample, NamedValue, PreflightCheck, Status, Verdict
+from uasfly.messages import Array, FactsSample, NamedValue, Status
+from uasfly.preflight_messages import PreflightCheck, Verdict
 from uasfly.record.reader import LogReader
 
 

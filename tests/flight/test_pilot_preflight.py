@@ -11,7 +11,8 @@ from tests.flight.test_pilot import PERIOD_S, Flight
 from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot, StepResult
 from uasfly.flight.preflight.preflight import FACTS_PATIENCE_S
-from uasfly.messages import FactsSample, Phase, RequestKind, Verdict
+from uasfly.messages import FactsSample, Phase, RequestKind
+from uasfly.preflight_messages import Verdict
 
 
 class CheckedFlight(Flight):

@@ -21,15 +21,14 @@ from uasfly.messages import (
     NamedValue,
     OdometrySample,
     Phase,
-    PreflightCheck,
     Request,
     RequestKind,
     RequestResult,
     StateEstimate,
     Status,
     VehicleSample,
-    Verdict,
 )
+from uasfly.preflight_messages import PreflightCheck, Verdict
 from uasfly.record.encode import from_json, json_schema, to_json
 from uasfly.record.reader import LogReader
 from uasfly.record.writer import BackgroundLogWriter, LogWriter, topic_of

@@ -28,7 +28,6 @@ from uasfly.messages import (
     Array,
     Authority,
     Phase,
-    PreflightCheck,
     ReferenceHorizon,
     Request,
     Sample,
@@ -39,6 +38,7 @@ from uasfly.messages import (
 from uasfly.mission import Mission
 from uasfly.observer.diagnosis import Diagnosis
 from uasfly.observer.observer import Observer
+from uasfly.preflight_messages import PreflightCheck
 
 TARGET_FRESH_S = 0.5  # an older attitude target is not what the vehicle is being told
 _ENDINGS = {Action.END: None, Action.RETURN: EndingAction.RETURN, Action.LAND: EndingAction.LAND}

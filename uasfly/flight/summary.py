@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from uasfly.errors import FileError
-from uasfly.messages import Array, OdometrySample, Phase, PreflightCheck, Sample, Status, TruthSample
+from uasfly.messages import Array, OdometrySample, Phase, Sample, Status, TruthSample
+from uasfly.preflight_messages import PreflightCheck
 
 KEPT_CYCLES = 256  # truth and GNSS samples are compared with cycles up to this long ago
 

@@ -13,13 +13,14 @@ from mcap.exceptions import McapError
 from mcap.records import Channel, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 
-from uasfly import messages
+from uasfly import messages, preflight_messages
 from uasfly.errors import FileError
 from uasfly.record.encode import from_json
 
 _TYPES = {
     kind.__name__: kind
-    for kind in vars(messages).values()
+    for module in (messages, preflight_messages)
+    for kind in vars(module).values()
     if isinstance(kind, type) and hasattr(kind, "__dataclass_fields__")
 }
 

@@ -19,13 +19,12 @@ from uasfly.messages import (
     FlightMode,
     HealthSample,
     NamedValue,
-    PreflightCheck,
     StateEstimate,
     VehicleSample,
-    Verdict,
 )
 from uasfly.mission import Mission
 from uasfly.observer.diagnosis import Diagnosis
+from uasfly.preflight_messages import PreflightCheck, Verdict
 
 PLACE = np.array((4.0, -3.0, 0.5))
 LEVEL = np.array((1.0, 0.0, 0.0, 0.0))

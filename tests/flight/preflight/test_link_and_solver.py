@@ -7,7 +7,8 @@ import math
 import pytest
 
 from tests.flight.preflight.gathering import AIRFRAME, OK, STOP, WARNING, check, facts, verdict
-from uasfly.messages import NamedValue, Verdict
+from uasfly.messages import NamedValue
+from uasfly.preflight_messages import Verdict
 
 
 @pytest.mark.parametrize(("rate_hz", "expected"), [(99.0, OK), (46.0, OK), (30.0, WARNING), (9.0, STOP), (0.0, STOP)])

@@ -23,7 +23,7 @@ from tests.flight.preflight.gathering import (
 from uasfly.flight.choices import Engage
 from uasfly.flight.preflight import PARAMETERS, judge
 from uasfly.link.parameters import parameter_value
-from uasfly.messages import Verdict
+from uasfly.preflight_messages import Verdict
 from uasfly.sim.parameters import ParameterTable
 
 HOVER = AIRFRAME.model.hover_thrust

@@ -21,7 +21,7 @@ from tests.flight.preflight.gathering import (
     view,
 )
 from uasfly.flight.preflight import judge
-from uasfly.messages import Verdict
+from uasfly.preflight_messages import Verdict
 
 LOST: dict[str, Any] = {"estimate": None, "origin": None, "diagnosis": None}
 

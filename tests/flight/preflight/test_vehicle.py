@@ -19,7 +19,8 @@ from tests.flight.preflight.gathering import (
     view,
 )
 from uasfly.flight.view import VehicleView
-from uasfly.messages import BatterySample, Verdict
+from uasfly.messages import BatterySample
+from uasfly.preflight_messages import Verdict
 
 
 @pytest.mark.parametrize("flag", ["attitude", "velocity", "position"])

@@ -28,6 +28,7 @@ from uasfly.messages import FlightMode
 from uasfly.record.reader import LogReader
 from uasfly.sim.mavlink.process import start_process
 
+PROGRAM = "from uasfly.cli.main import main; main()"
 PATIENCE_S = 180.0
 AFTERWARDS_S = 4.0  # a killed program's vehicle is watched for so long
 TWICE_S = 0.5
@@ -87,9 +88,10 @@ class _Program:
         arguments += [text for setting in settings for text in ("--set", setting)]
         if case.act in MISBEHAVIOUR:
             begin, duration = str(BEGIN_S), str(case.act_s)
-            head = ["-m", "uasfly.drivers.faults.misbehave", MISBEHAVIOUR[case.act], begin, duration]
+            what = (MISBEHAVIOUR[case.act], begin, duration)
+            head = ["-c", f"from uasfly.drivers.faults.misbehave import misbehave; misbehave(*{what}); {PROGRAM}"]
         else:
-            head = ["-c", "from uasfly.cli.main import main; main()"]
+            head = ["-c", PROGRAM]
         self._command = [sys.executable, *head, *arguments]
 
     def __enter__(self) -> _Program:

@@ -1,13 +1,10 @@
 """Lets the running program misbehave from inside, for the fault table: a cycle that hangs, a solver that fails.
 
-Run as `python -m uasfly.drivers.faults.misbehave hang|fail SECONDS_AFTER_LEGS DURATION ARGUMENTS...`; the rest is the
-command line of uasfly.
+The process calls `misbehave` before the command line, see `live`.
 """
 
 from __future__ import annotations
 
-import importlib
-import sys
 import time
 
 from uasfly.control.iteration import RealTimeIteration
@@ -68,8 +65,6 @@ def _note(pilot: Pilot, window: _Window, time_s: float) -> None:
         window.legs_s = time_s
 
 
-if __name__ == "__main__":
-    what, begin, duration = sys.argv[1:4]
-    {"hang": hang, "fail": failing_solver}[what](_Window(float(begin), float(duration)))
-    sys.argv[1:] = sys.argv[4:]
-    importlib.import_module("uasfly.cli.main").main()
+def misbehave(what: str, begin_s: str, duration_s: str) -> None:
+    """Prepare this process: "hang" or "fail", so long after the legs have begun [s], for so long [s]."""
+    {"hang": hang, "fail": failing_solver}[what](_Window(float(begin_s), float(duration_s)))

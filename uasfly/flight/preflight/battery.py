@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from uasfly.flight.monitors.battery import LANDING_S
 from uasfly.flight.preflight.gathered import Gathered, Subject
-from uasfly.messages import PreflightCheck
+from uasfly.preflight_messages import PreflightCheck
 from uasfly.trajectories.mission_trajectory import MissionTrajectory
 
 TAKEOFF_S = 8.0  # arming, spooling up and settling, beside the climb

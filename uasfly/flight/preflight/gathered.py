@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from uasfly.airframe import Airframe
 from uasfly.flight.choices import Engage
 from uasfly.flight.view import VehicleView
-from uasfly.messages import Array, FactsSample, PreflightCheck, StateEstimate, Verdict
+from uasfly.messages import Array, FactsSample, StateEstimate
 from uasfly.mission import Mission
 from uasfly.observer.diagnosis import Diagnosis
+from uasfly.preflight_messages import PreflightCheck, Verdict
 
 
 @dataclass(frozen=True, slots=True)

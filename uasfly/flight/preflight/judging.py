@@ -12,7 +12,7 @@ from uasfly.flight.preflight.parameters import parameter_checks
 from uasfly.flight.preflight.place import place_checks, plan_from_here
 from uasfly.flight.preflight.solver import solver_check
 from uasfly.flight.preflight.vehicle import vehicle_checks
-from uasfly.messages import PreflightCheck, Verdict
+from uasfly.preflight_messages import PreflightCheck, Verdict
 
 SEVERITIES = {Verdict.WARNING: 4, Verdict.STOP: 3}  # MAVLink: warning, error
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from uasfly.flight.preflight.gathered import Gathered, Subject
-from uasfly.messages import PreflightCheck
+from uasfly.preflight_messages import PreflightCheck
 
 LEAST_IN_TIME = 2.0  # samples within the time after which telemetry counts as silent: one may be lost
 TARGET_LEAST_HZ = 5.0  # the echo until offboard wants a target younger than half a second

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from uasfly.flight.choices import Engage
 from uasfly.flight.preflight.gathered import Gathered, Subject
 from uasfly.flight.preflight.place import may_return
-from uasfly.messages import PreflightCheck
+from uasfly.preflight_messages import PreflightCheck
 
 PARAMETERS = (
     "COM_OF_LOSS_T",

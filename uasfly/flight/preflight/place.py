@@ -10,8 +10,9 @@ import numpy as np
 from uasfly.flight.course import TOO_FAR_M
 from uasfly.flight.preflight.gathered import Gathered, Subject
 from uasfly.frames import euler_from_quaternion
-from uasfly.messages import Array, PreflightCheck
+from uasfly.messages import Array
 from uasfly.monitor_settings import Monitor
+from uasfly.preflight_messages import PreflightCheck
 from uasfly.trajectories.feasibility import check_way_in
 from uasfly.trajectories.mission_trajectory import MissionTrajectory
 from uasfly.trajectories.trajectory import TrajectoryError

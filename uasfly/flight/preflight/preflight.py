@@ -9,9 +9,10 @@ from uasfly.flight.choices import Engage
 from uasfly.flight.preflight.gathered import Gathered
 from uasfly.flight.preflight.judging import judge
 from uasfly.flight.view import VehicleView
-from uasfly.messages import Array, FactsSample, PreflightCheck, Sample, StateEstimate
+from uasfly.messages import Array, FactsSample, Sample, StateEstimate
 from uasfly.mission import Mission
 from uasfly.observer.diagnosis import Diagnosis
+from uasfly.preflight_messages import PreflightCheck
 
 AGES_KEPT = 100  # cycles
 FACTS_PATIENCE_S = 4.0  # the driver is done within three; without its facts much is not known, and told so

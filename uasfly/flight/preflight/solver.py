@@ -6,7 +6,7 @@ import numpy as np
 
 from uasfly.control.nmpc_controller import DEADLINE_SHARE
 from uasfly.flight.preflight.gathered import Gathered, Subject
-from uasfly.messages import PreflightCheck
+from uasfly.preflight_messages import PreflightCheck
 
 LATE_WARNING = 0.02  # share of late steps: more than a busy moment of the computer
 BUSY_SHARE = 0.5  # of the deadline, median: camera, log and a hot processor want the rest

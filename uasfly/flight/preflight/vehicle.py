@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from uasfly.flight.monitors.gnss import FIX
 from uasfly.flight.preflight.gathered import Gathered, Subject
 from uasfly.flight.readiness import unready
-from uasfly.messages import PreflightCheck
+from uasfly.preflight_messages import PreflightCheck
 
 NIS_WARNING = 3.0  # about 1 when consistent: errors 1.7 times as large as the airframe file says
 REJECTED_WARNING = 0.1  # gates refuse half a per cent of good measurements
