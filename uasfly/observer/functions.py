@@ -12,6 +12,7 @@ from typing import Any
 
 import casadi as ca
 
+from uasfly import native
 from uasfly.messages import Array
 from uasfly.observer import error_state as es
 from uasfly.observer import measurements as me
@@ -216,6 +217,13 @@ def injection(markers: int) -> ca.Function:
     nominal, error = ca.SX.sym("nominal", layout.nominal_size), ca.SX.sym("error", layout.errors)
     covariance = ca.SX.sym("covariance", layout.errors, layout.errors)
     return _function(f"injection_{markers}", [nominal, covariance, error], [*_inject(nominal, covariance, error)])
+
+
+@lru_cache(maxsize=8)
+def compiled_steps(markers: int) -> tuple[ca.Function, ca.Function]:
+    """`prediction` and `odometry_step`, compiled where that can be had (some seconds, once a computer)."""
+    step, odometry = native.compiled([prediction(markers), odometry_step(markers)], f"observer{markers}")
+    return step, odometry
 
 
 @lru_cache(maxsize=1)
