@@ -107,36 +107,40 @@ class PieceTable:
         times = np.minimum(np.maximum(times_s, 0.0), self.duration_s)
         index = self._starts.searchsorted(times, "right") - 1
         t = times - self._starts.take(index)
-        powers = np.ones((t.size, 1, 4))
+        powers = np.empty((t.size, 4))
         square = t * t
-        powers[:, 0, 1] = t
-        powers[:, 0, 2] = square
-        powers[:, 0, 3] = square * t
-        motion = (powers @ self._derivatives.take(index, axis=0))[:, 0]
-        position, velocity, acceleration = motion[:, 0:3], motion[:, 3:6], motion[:, 6:9]
-        groups = self._groups.take(index)
-        group = int(groups[0]) if t.size else 0
-        same = not np.count_nonzero(groups - group)
-        if same and not self._curved[group]:
-            return position.copy(), velocity.copy(), acceleration.copy()
-        scaled = _scaled_harmonics(motion[:, 9:])
-        if same:
-            curved = motion[:, :9] + scaled @ self._vectors[group]
-        else:
-            curved = motion[:, :9] + (scaled[:, None, :] @ self._vectors.take(groups, axis=0))[:, 0]
-        return curved[:, 0:3].copy(), curved[:, 3:6].copy(), curved[:, 6:9].copy()
+        powers[:, 0] = 1.0
+        powers[:, 1] = t
+        powers[:, 2] = square
+        powers[:, 3] = square * t
+        first = int(index[0]) if t.size else 0
+        if np.count_nonzero(index - first):
+            motion = (powers[:, None, :] @ self._derivatives.take(index, axis=0))[:, 0]
+            groups = self._groups.take(index)
+            group = int(groups[0])
+            same = not np.count_nonzero(groups - group)
+        else:  # all in one piece, as most horizons are
+            motion = powers @ self._derivatives[first]
+            group, same = int(self._groups[first]), True
+        if not same:
+            scaled = _scaled_harmonics(motion[:, 9:])
+            motion[:, :9] += (scaled[:, None, :] @ self._vectors.take(groups, axis=0))[:, 0]
+        elif self._curved[group]:
+            motion[:, :9] += _scaled_harmonics(motion[:, 9:]) @ self._vectors[group]
+        return motion[:, 0:3].copy(), motion[:, 3:6].copy(), motion[:, 6:9].copy()
 
 
 def _scaled_harmonics(phase: Array) -> Array:
     """Harmonics (4) times 1, rate, acceleration and squared rate (n, 16) of phase, its rate and acceleration (n, 3)."""
-    turned = np.exp(1j * phase[:, 0])
-    harmonics = np.empty((len(phase), HARMONICS // 2), dtype=complex)
-    harmonics[:, 0] = turned
-    harmonics[:, 1] = turned * turned
-    factors = np.ones((len(phase), 4, 1))
-    factors[:, 1:3, 0] = phase[:, 1:]
-    factors[:, 3, 0] = phase[:, 1] * phase[:, 1]
-    scaled: Array = factors * harmonics.view(float)[:, None, :]
+    scaled = np.empty((len(phase), 4, HARMONICS))
+    angle, rate = phase[:, 0], phase[:, 1]
+    cosine, sine = np.cos(angle), np.sin(angle)
+    harmonics = scaled[:, 0]
+    harmonics[:, 0], harmonics[:, 1] = cosine, sine
+    harmonics[:, 2], harmonics[:, 3] = cosine * cosine - sine * sine, 2.0 * cosine * sine
+    np.multiply(harmonics, rate[:, None], out=scaled[:, 1])
+    np.multiply(harmonics, phase[:, 2:], out=scaled[:, 2])
+    np.multiply(scaled[:, 1], rate[:, None], out=scaled[:, 3])
     return scaled.reshape(-1, 4 * HARMONICS)
 
 

@@ -113,7 +113,9 @@ class YawTable:
         times = np.minimum(np.maximum(times_s, 0.0), self._end)
         index = self._starts.searchsorted(times, "right") - 1
         t = times - self._starts.take(index)
-        c = self._coefficients.take(index, axis=1)
+        first = int(index[0]) if t.size else 0
+        one = not np.count_nonzero(index - first)
+        c = self._coefficients[:, first].tolist() if one else self._coefficients.take(index, axis=1)
         slope = c[1] + t * (2.0 * c[2] + 3.0 * t * c[3])
         return c[0] + t * (c[1] + t * (c[2] + t * c[3])), slope
 
