@@ -33,6 +33,11 @@ class Lasting:
         self._acted_s: float | None = None
         self._grown = False
 
+    @property
+    def idle(self) -> bool:
+        """Whether nothing is found, lasts or is not long gone: another update without a finding changes nothing."""
+        return self._since_s is None and self._acted_s is None
+
     def update(self, time_s: float, found: bool) -> Action:
         """The action at `time_s`; times must not fall."""
         settings = self._settings
@@ -79,6 +84,8 @@ class Watch:
     def check(self, watched: Watched) -> Alarm | None:
         """The alarm that lasts, the same object as long as its action does."""
         text = self._find(watched) if watched.flying or not self._flying_only else ""
+        if not text and self._lasting.idle:  # nearly always
+            return None
         action = self._lasting.update(watched.time_s, bool(text))
         if action is Action.NOTHING:
             self._alarm = None
