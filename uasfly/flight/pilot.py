@@ -236,7 +236,7 @@ class Pilot:
         origin = self.course.origin
         flying = self._phase is Phase.LEGS and self.sequencer.streaming and origin is not None
         place = np.zeros(3) if origin is None else origin
-        self._reference = self._place_at(time_s) if flying else None
+        self._reference = self.course.place_at(time_s) if flying else None
         return self.monitors.check(
             Watched(
                 time_s=time_s,
@@ -251,10 +251,6 @@ class Pilot:
                 authority=authority,
             )
         )
-
-    def _place_at(self, time_s: float) -> Array:
-        place: Array = self.reference_at(np.array([time_s])).position_in_world[0]
-        return place
 
     def _respond(self, time_s: float, estimate: StateEstimate, alarms: tuple[Alarm, ...]) -> None:
         """Do what the worst alarm asks for, where uasfly flies."""
@@ -330,7 +326,7 @@ class Pilot:
         if course.begun and sequencer.phase in (Phase.LEGS, Phase.ENGAGE):
             progress = course.progress(time_s)
         if in_legs and course.begun:
-            reference = self._place_at(time_s) if self._reference is None else self._reference
+            reference = course.place_at(time_s) if self._reference is None else self._reference
         elif sequencer.phase in (Phase.ENDING, Phase.DONE):
             progress = 1.0
         announcements = tuple(sequencer.announcements)

@@ -37,13 +37,19 @@ class Caller:
         buffer, evaluate = function.buffer()
         self._buffer: Any = buffer
         self._evaluate: Callable[[], None] = evaluate
+        self._arguments: list[Array | None] = [None] * function.n_in()
+        self._results: list[Array | None] = [None] * function.n_out()
 
     def __call__(self, arguments: tuple[Array, ...], results: tuple[Array, ...]) -> None:
         """Evaluate; arrays are contiguous, float64, at least as long as the function's; matrices are column-major."""
         for index, argument in enumerate(arguments):
-            self._buffer.set_arg(index, argument.data)
+            if argument is not self._arguments[index]:  # most are the same array in every call
+                self._buffer.set_arg(index, argument.data)
+                self._arguments[index] = argument
         for index, result in enumerate(results):
-            self._buffer.set_res(index, result.data)
+            if result is not self._results[index]:
+                self._buffer.set_res(index, result.data)
+                self._results[index] = result
         self._evaluate()
 
 

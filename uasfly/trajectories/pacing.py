@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -74,15 +73,12 @@ class Pacing:
         """The same where the pace does not change, which is nearly always."""
         begin_s, pace = self._clock_s + CHANGE_S, self._to
         reference = timed.sample(self._scalars_at(begin_s)[0] + pace * (clock_s - begin_s))
-        if pace == 1.0:
-            return replace(reference, time_s=clock_s)
+        velocity, acceleration = reference.velocity_in_world, reference.acceleration_in_world
+        yaw_rate = reference.yaw_rate_rad_s
+        if pace != 1.0:
+            velocity, acceleration, yaw_rate = velocity * pace, acceleration * (pace * pace), yaw_rate * pace
         return ReferenceHorizon(
-            clock_s,
-            reference.position_in_world,
-            reference.velocity_in_world * pace,
-            reference.acceleration_in_world * (pace * pace),
-            reference.yaw_rad,
-            reference.yaw_rate_rad_s * pace,
+            clock_s, reference.position_in_world, velocity, acceleration, reference.yaw_rad, yaw_rate
         )
 
     def _scalars_at(self, clock_s: float) -> tuple[float, float]:
