@@ -10,7 +10,7 @@ from uasfly.frames import euler_from_quaternion, wrap_angle
 from uasfly.messages import Array, Setpoint, StateEstimate
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Attitude:
     """Roll, pitch, yaw [rad] and the rate of yaw [rad/s] of an estimate."""
 

@@ -55,7 +55,7 @@ class _SquareSum:
         return {name: math.sqrt(square / self.count) for name, square in squares.items()}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Cycle:
     time_s: float
     estimate: Array

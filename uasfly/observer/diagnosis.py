@@ -13,7 +13,7 @@ from uasfly.observer import states as s
 from uasfly.observer.moment import Moment, Verdict
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Diagnosis:
     """The filter at one time.
 

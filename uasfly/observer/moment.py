@@ -59,7 +59,7 @@ class Moment:
         return math.sqrt(max(0.0, total) / 3.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Verdict:
     """What the gate said of one sensor: normalised innovation squared, degrees of freedom, accepted or not."""
 
