@@ -75,6 +75,8 @@ class RealTimeIteration:
         self.workspace = Workspace(problem)
         self.backend, self.announcement = make_backend(problem, self.workspace, backend, options)
         self.plan_start_s: float | None = None
+        self._first = self.workspace.input_reference[0]
+        self._move_share = problem.move_share
 
     def solve(self, start_s: float, iterations: int = 1, before: Array | None = None) -> SolveStatus:
         """Plan from `start_s` on [s]; on a cold start at least three iterations.
@@ -89,9 +91,8 @@ class RealTimeIteration:
         status = self.backend.references()
         if status is not SolveStatus.CONVERGED:
             return status
-        first = self.workspace.input_reference[0]
-        if before is not None and self.problem.moves_weigh:
-            first[:] = self.problem.first_input_reference(first, before)
+        if before is not None:
+            self._first += self._move_share * (before - self._first)  # see `Problem.move_share`
         elapsed = -1.0
         if self.plan_start_s is not None and 0.0 <= start_s - self.plan_start_s <= LONGEST_SHIFT_S:
             elapsed = start_s - self.plan_start_s
