@@ -87,6 +87,11 @@ class DirectVehicle(Protocol):
         ...
 
     @property
+    def condition(self) -> tuple[FlightMode, bool, bool]:
+        """Mode, whether it is armed, whether it is in the air."""
+        ...
+
+    @property
     def link_faults(self) -> MessageFaults:
         """What the link does to messages now."""
         ...
@@ -166,8 +171,7 @@ class InProcessLink:
         self._now_s = vehicle.time_s
         self._ahead_s = 0.0  # host time minus vehicle time: the vehicle's clock may jump, and starts anew with it
         self._boots = vehicle.boots
-        state = vehicle.state()
-        self._said = (state.mode, state.armed, state.in_air)  # last told
+        self._said = vehicle.condition  # last told
         self._ticks = [
             _Tick(1.0 / ODOMETRY_RATE_HZ, vehicle.odometry),
             _Tick(1.0 / ATTITUDE_TARGET_RATE_HZ, vehicle.attitude_target),
@@ -235,14 +239,12 @@ class InProcessLink:
             self._arrive(LinkSample(vehicle.time_s, LinkEvent.REBOOTED))
 
     def _state(self) -> VehicleSample:
-        state = self._vehicle.state()
-        self._said = (state.mode, state.armed, state.in_air)
-        return state
+        self._said = self._vehicle.condition
+        return self._vehicle.state()
 
     def _tell_changes(self) -> None:
         """PX4 tells a new mode at once."""
-        state = self._vehicle.state()
-        if (state.mode, state.armed, state.in_air) != self._said:
+        if self._vehicle.condition != self._said:
             self._arrive(self._state())
 
     def _command_latency(self) -> float:

@@ -136,11 +136,7 @@ class Estimate:
         """The estimate as ODOMETRY gives it, with the white noise of a single sample."""
         self.refresh()
         state = self._state
-        attitude = (
-            (state[6], state[7], state[8], state[9])
-            if self._past is None
-            else self._before(self._sensors.delays.attitude_s).attitude
-        )
+        attitude = state[6:10] if self._past is None else self._before(self._sensors.delays.attitude_s).attitude
         white = self._sensors.attitude_noise_rad
         (ea, eb, ec), (na, nb, nc) = self.attitude_error, self._noise.row[_ATTITUDE]
         error = np.array((ea + white * na, eb + white * nb, ec + white * nc))
