@@ -10,12 +10,12 @@ import math
 from dataclasses import dataclass
 
 from uasfly.control.compiled import CompiledBackend
-from uasfly.control.native_library import NativeUnavailableError
 from uasfly.control.problem import Problem
 from uasfly.control.qp import QpOptions, SolveStatus
 from uasfly.control.virtual_machine import VirtualMachineBackend
 from uasfly.control.workspace import Backend, Workspace
 from uasfly.messages import Array
+from uasfly.native import NativeUnavailableError
 
 COLD_ITERATIONS = 3
 LONGEST_SHIFT_S = 0.5  # an older plan is no better a start than the references

@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -187,7 +188,7 @@ class InProcessLink:
                 self._deliver(heapq.heappop(self._commands)[2])
             else:
                 self._arrive(next_tick.read())
-                next_tick.count += 1
+                next_tick.go_on()
             self._tell_changes()
             for text in self._vehicle.take_texts():
                 self._arrive(text)
@@ -285,21 +286,21 @@ class InProcessLink:
 class _Tick:
     """A stream with a fixed rate: when it is due next, and how to read it."""
 
-    __slots__ = ("count", "period_s", "read")
+    __slots__ = ("count", "due_s", "period_s", "read")
 
     def __init__(self, period_s: float, read: _Reader) -> None:
         self.period_s = period_s
         self.read = read
         self.count = 1
+        self.due_s = period_s
 
-    @property
-    def due_s(self) -> float:
-        return self.count * self.period_s
+    def go_on(self) -> None:
+        self.count += 1
+        self.due_s = self.count * self.period_s
 
 
 class _Reader(Protocol):
     def __call__(self) -> Sample: ...
 
 
-def _due(tick: _Tick) -> float:
-    return tick.due_s
+_due = attrgetter("due_s")
