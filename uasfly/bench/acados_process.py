@@ -54,15 +54,13 @@ class AcadosProcess:
     def __init__(self, folder: Path) -> None:
         self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
         libraries = str(folder / "acados" / "install" / "lib")
-        environment = dict(os.environ)
-        for name, place in (("LD_LIBRARY_PATH", libraries), ("PYTHONPATH", _package_root())):
-            environment[name] = os.pathsep.join(filter(None, (place, environment.get(name, ""))))
+        paths = os.pathsep.join(filter(None, (libraries, os.environ.get("LD_LIBRARY_PATH", ""))))
         self._process = subprocess.Popen(
             [sys.executable, "-m", "uasfly.bench.acados_child", str(folder)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._complaints,
-            env=environment,
+            env={**os.environ, "LD_LIBRARY_PATH": paths},
         )
         answer = self._receive()
         if not isinstance(answer, Ready):
@@ -141,10 +139,3 @@ class AcadosProcess:
         self._complaints.seek(0)
         lines = self._complaints.read().decode(errors="replace").strip().splitlines()
         return f"the process that runs acados has ended: {lines[-1] if lines else 'without a word'}"
-
-
-def _package_root() -> str:
-    """Where `uasfly` is imported from, for a process that may start elsewhere."""
-    import uasfly
-
-    return str(Path(uasfly.__file__).parents[1])

@@ -10,15 +10,32 @@ from pathlib import Path
 
 from uasfly.airframe import Airframe
 from uasfly.bench.acados_process import AcadosProcess, AcadosUnavailableError, find_acados
-from uasfly.bench.cases import NODES, most_nodes
+from uasfly.bench.cases import NODES, SATURATED, most_nodes
 from uasfly.bench.contestants import LIBRARY, AcadosSolver, Contestant, UasflySolver
+from uasfly.bench.cycle import CycleFigures, measure_cycle
+from uasfly.bench.link import measure_link
+from uasfly.bench.observer import ObserverFigures, measure_observer
+from uasfly.bench.recommend import Recommendation, recommend
 from uasfly.bench.solver import SolverRow, measure_solvers
-from uasfly.control.native_library import NativeUnavailableError, load_library
+from uasfly.bench.timing import Figures
+from uasfly.control.native_library import load_solver
+from uasfly.drivers.plan import FlightPlan
 from uasfly.errors import UasflyError
+from uasfly.files import find_file, load_file
+from uasfly.mission import Mission
+from uasfly.native import NativeUnavailableError
+from uasfly.sim.plant import Plant
+from uasfly.sim.scenario import Scenario
 
 BACKENDS = ("c", "vm", LIBRARY)
 CLAIMED_NODES = (30, 60)  # sizes that get more blocks: their 99th percentiles are told in claims
 QUICK_NODES = CLAIMED_NODES
+SOLVER_SHARE = 0.6  # of the time that everything takes, for the progress bar
+OBSERVER_SAMPLES = 4000
+LINK_S, CYCLES_S = 4.0, 16.0
+SEED = 1
+BUSY_SHARE = 0.95
+HOVER: dict[str, object] = {"legs[0].duration_s": 300.0, "takeoff.height_m": 1.0, "legs[0].position_m": [0.0, 0.0, 1.0]}
 
 Told = Callable[[str, float], None]  # what is being measured, share that is done
 
@@ -52,15 +69,64 @@ class BenchSettings:
 
 
 @dataclass(slots=True)
-class SolverResult:
-    """Rows of the solver's table and what there is to say about them."""
+class BenchResult:
+    """What was measured; None for what was not.
+
+    Attributes:
+        rows: of the solver's table. acados: version of its package.
+        observer, cycle, link: times. recommended: what the airframe file should set.
+        own_share: of the time in which the solver ran, how much the processor really worked for it.
+        remarks: what there is to say.
+    """
 
     rows: list[SolverRow] = field(default_factory=list)
-    acados: str | None = None  # its package's version
+    acados: str | None = None
+    observer: ObserverFigures | None = None
+    cycle: CycleFigures | None = None
+    link: Figures | None = None
+    recommended: Recommendation | None = None
+    own_share: float | None = None
     remarks: list[str] = field(default_factory=list)
 
+    def solver_p99_ms(self) -> dict[int, float]:
+        """p99 of the solver that flies here, by size, with saturated inputs."""
+        flown = next((name for name in ("c", "vm") if any(row.backend == name for row in self.rows)), "")
+        return {row.n: row.figures.p99 for row in self.rows if row.backend == flown and row.case == SATURATED.name}
 
-def bench_solver(settings: BenchSettings, told: Told) -> SolverResult:
+
+def run_bench(settings: BenchSettings, told: Told, *, solver_only: bool = False) -> BenchResult:
+    """Measure everything; what fails on the way is told in the remarks, and the rest is there nevertheless.
+
+    Raises:
+        UasflyError: for settings that cannot be measured here.
+    """
+    result = bench_solver(settings, lambda text, done: told(text, done if solver_only else SOLVER_SHARE * done))
+    if solver_only:
+        return result
+    told("observer", SOLVER_SHARE)
+    result.observer = measure_observer(settings.airframe, OBSERVER_SAMPLES // (4 if settings.quick else 1))
+    mission = load_file(find_file("mission", "hover"), Mission, HOVER)
+    plant = load_file(find_file("plant", settings.airframe.plant), Plant)
+    plan = FlightPlan(
+        settings.airframe, mission, "nmpc", SEED, load_file(find_file("scenario", "calm"), Scenario), plant
+    )
+    try:
+        told("link on loopback", SOLVER_SHARE + 0.05)
+        result.link = measure_link(plan, LINK_S / (2.0 if settings.quick else 1.0))
+        told("whole cycle in a live flight: take-off", SOLVER_SHARE + 0.1)
+        flight = 1.0 - SOLVER_SHARE - 0.1
+        cycles = round(CYCLES_S * settings.airframe.controller.rate_hz / (4.0 if settings.quick else 1.0))
+        result.cycle = measure_cycle(
+            plan, cycles, lambda done: told("whole cycle in a live flight", 1.0 - flight * (1.0 - done))
+        )
+    except UasflyError as error:
+        result.remarks.append(f"not everything was measured: {error}")
+    if result.cycle is not None:
+        result.recommended = recommend(settings.airframe.controller, result.solver_p99_ms(), result.cycle.rest_p99_ms)
+    return result
+
+
+def bench_solver(settings: BenchSettings, told: Told) -> BenchResult:
     """Measure the solver, beside acados where that is to be had.
 
     Raises:
@@ -69,9 +135,10 @@ def bench_solver(settings: BenchSettings, told: Told) -> SolverResult:
     for n in settings.sizes:
         if not 5 <= n <= most_nodes():
             raise UasflyError(f"--nodes {n}: expected numbers from 5 to {most_nodes()}")
-    result = SolverResult()
+    result = BenchResult()
     with contextlib.ExitStack() as stack:
-        contestants: list[Contestant] = [UasflySolver(name) for name in _backends(settings.backends, result.remarks)]
+        own = [UasflySolver(name) for name in _backends(settings.backends, result.remarks)]
+        contestants: list[Contestant] = [*own]
         try:
             folder = find_acados(settings.acados)
             told("acados: generated and compiled", 0.0)
@@ -92,6 +159,12 @@ def bench_solver(settings: BenchSettings, told: Told) -> SolverResult:
 
         for row in measure_solvers(settings.airframe, settings.sizes, contestants, settings.blocks, tell):
             result.rows.append(row)
+    result.own_share = sum(solver.processor_s for solver in own) / sum(solver.wall_s for solver in own)
+    if result.own_share < BUSY_SHARE:
+        result.remarks.append(
+            f"something else ran on this computer: the solver had the processor {100 * result.own_share:.0f} % of the "
+            "time; the p99 tell more of that than of uasfly"
+        )
     return result
 
 
@@ -103,7 +176,7 @@ def _backends(wanted: Sequence[str], remarks: list[str]) -> list[str]:
     chosen = [name for name in BACKENDS if not wanted or name in wanted]
     if "c" in chosen:
         try:
-            load_library()
+            load_solver()
         except NativeUnavailableError as reason:
             if wanted:
                 raise
