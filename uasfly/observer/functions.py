@@ -233,6 +233,12 @@ def compiled_steps(markers: int) -> tuple[ca.Function, ca.Function]:
 
 
 @lru_cache(maxsize=1)
+def compiled_extrapolation() -> ca.Function:
+    """`extrapolation`, compiled where that can be had."""
+    return native.compiled([extrapolation()], "extrapolation")[0]
+
+
+@lru_cache(maxsize=1)
 def extrapolation() -> ca.Function:
     """(nominal core (16,) or longer, inputs (PREDICTION_INPUTS or longer)) -> nominal core after IN_DT."""
     core, inputs = ca.SX.sym("core", s.CORE_NOMINAL), ca.SX.sym("inputs", s.PREDICTION_INPUTS)

@@ -63,7 +63,7 @@ class Stepper:
         self._outputs = np.empty(s.ODOMETRY_OUTPUTS)
         self._predictions: dict[int, functions.Caller] = {}
         self._odometry_steps: dict[int, functions.Caller] = {}
-        self._extrapolation = functions.Caller(functions.extrapolation())
+        self._extrapolation = functions.Caller(functions.compiled_extrapolation())
         self._marker_algebra = MarkerAlgebra()
         self.prepare(0, in_flight=False)
 
