@@ -87,7 +87,7 @@ def _show(result: BenchResult) -> None:
             console.print(table)
     if result.recommended is not None:
         console.print("For the airframe file (--recommend FILE writes it):")
-        console.print(recommendation_lines(result.recommended), markup=False, highlight=False)
+        print(recommendation_lines(result.recommended))
     for remark in result.remarks:
         console.print(remark, markup=False, highlight=False)
 
