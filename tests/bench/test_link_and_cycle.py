@@ -55,6 +55,7 @@ def test_only_cycles_on_the_way_count_and_enough_of_them_end_the_flight() -> Non
         watcher.measured(1.5)
     assert watcher.cycles_ms == [1.5, 1.5]
     assert watcher.solves_ms == [0.1, 0.1]
+    assert watcher.to_setpoints_ms == [1.0, 1.0]
     assert ended == [1]
 
 

@@ -34,13 +34,13 @@ class CycleFigures:
         cycle: from the cycle's first look for samples to its next sleep [ms]: decoding, observer, controller, monitors,
             the setpoint sent, the record handed to the log, the status to the view.
         solver: the solver in it [ms].
-        to_setpoint: the part of all cycles of the flight up to the setpoint, as the flight's summary has it [ms].
+        to_setpoint: the part of the same cycles up to the setpoint, as a flight's summary counts them [ms].
         motion_to_setpoint: from when the newest motion was true to the setpoint that answers it [ms].
     """
 
     cycle: Figures
     solver: Figures
-    to_setpoint: dict[str, float]
+    to_setpoint: Figures
     motion_to_setpoint: dict[str, float] | None
 
     @property
@@ -59,12 +59,14 @@ class Watcher:
     flying: bool = False
     cycles_ms: list[float] = field(default_factory=list)
     solves_ms: list[float] = field(default_factory=list)
+    to_setpoints_ms: list[float] = field(default_factory=list)
 
     def watch(self, status: Status, cycle: Cycle) -> None:
         """Called by the driver's view thread after each cycle."""
         self.flying = status.phase is Phase.LEGS
         if self.flying and cycle.sent and cycle.solve_ms is not None:
             self.solves_ms.append(cycle.solve_ms)
+            self.to_setpoints_ms.append(cycle.cycle_ms)
             if len(self.solves_ms) % 50 == 0:
                 self.told(min(1.0, len(self.solves_ms) / self.wanted))
 
@@ -123,9 +125,10 @@ def measure_cycle(plan: FlightPlan, cycles: int, told: Callable[[float], None]) 
     finally:
         sys.setswitchinterval(switch_interval)
     cycle, solver = Figures.of(watcher.cycles_ms), Figures.of(watcher.solves_ms)
-    if len(watcher.cycles_ms) < cycles or cycle is None or solver is None:
+    to_setpoint = Figures.of(watcher.to_setpoints_ms)
+    if len(watcher.cycles_ms) < cycles or cycle is None or solver is None or to_setpoint is None:
         raise UasflyError(f"the flight ended before enough of it was measured: {summary['reason'] or 'it was short'}")
-    return CycleFigures(cycle, solver, summary["cycle_ms"], summary["latency_ms"])
+    return CycleFigures(cycle, solver, to_setpoint, summary["latency_ms"])
 
 
 async def _fly(plan: FlightPlan, url: str, log: Path, watcher: Watcher) -> dict[str, Any]:

@@ -28,7 +28,7 @@ def as_json(result: BenchResult) -> dict[str, Any]:
         "observer_ms": None if observer is None else observer.odometry.as_dict(),
         "observer_with_marker_ms": None if observer is None else observer.with_marker.as_dict(),
         "cycle_ms": None if cycle is None else cycle.cycle.as_dict(),
-        "cycle_to_setpoint_ms": None if cycle is None else cycle.to_setpoint,
+        "cycle_to_setpoint_ms": None if cycle is None else cycle.to_setpoint.as_dict(),
         "motion_to_setpoint_ms": None if cycle is None else cycle.motion_to_setpoint,
         "link_ms": None if link is None else link.as_dict(),
         "recommended": None if result.recommended is None else result.recommended.as_dict(),
@@ -67,7 +67,7 @@ def parts_table(result: BenchResult) -> Table | None:
         rows.append(("link, telemetry out to setpoint in", result.link.as_dict()))
     if result.cycle is not None:
         rows.append(("whole cycle, all but sleeping", result.cycle.cycle.as_dict()))
-        rows.append(("whole cycle, up to the setpoint", result.cycle.to_setpoint))
+        rows.append(("of it, up to the setpoint", result.cycle.to_setpoint.as_dict()))
         rows.append(("motion true to setpoint sent", result.cycle.motion_to_setpoint))
     if not rows:
         return None
