@@ -1,4 +1,4 @@
-"""Finds, reads and checks the files people write (airframes, missions, plants, scenarios).
+"""Finds, reads and checks the files people write (airframes, missions, plants, scenarios, cameras, bundles).
 
 Every problem names line, field, what was expected and what was found; `--set` values are checked the same way.
 """
@@ -19,7 +19,7 @@ from uasfly.file_problems import describe_problems, found, nearest
 from uasfly.yaml_text import DataPath, Document, dotted, parse_yaml
 
 M = TypeVar("M", bound=BaseModel)
-Kind = Literal["airframe", "mission", "scenario", "plant"]
+Kind = Literal["airframe", "mission", "scenario", "plant", "camera", "bundle"]
 
 MAX_BYTES = 96 * 1024  # the YAML reader takes a second for this much; a thousand waypoints need half of it
 SUFFIXES = (".yaml", ".yml")

@@ -71,7 +71,7 @@ def test_every_problem_of_every_file_is_found(tmp_path: Path) -> None:
     assert "line 4" in texts
     assert "legs[0]" in texts
     assert "no such file" in by_file["nowhere.yaml"][0].message
-    assert "no such file, and no mission, airframe, scenario or plant" in by_file["nothing"][0].message
+    assert "no such file, and no mission, airframe, scenario, plant, camera or bundle" in by_file["nothing"][0].message
     assert by_file[good] == [CheckFinding(good, "ok", "a mission")]
 
 
@@ -80,7 +80,7 @@ def test_a_file_of_no_kind_is_told_what_was_expected(tmp_path: Path) -> None:
     path = _write(tmp_path, "colour: red\n")
     (finding,) = check_files([path], "f550")
     assert finding.severity == "error"
-    assert "expected a mission, an airframe, a scenario or a plant" in finding.message
+    assert "expected a mission, an airframe, a scenario, a plant, a camera or a bundle" in finding.message
 
 
 def test_missions_are_held_against_the_airframe(tmp_path: Path) -> None:
@@ -136,7 +136,9 @@ def test_each_kind_has_a_schema_of_its_own_fields(kind: str) -> None:
 
 def test_an_unknown_kind_has_no_schema() -> None:
     """The error lists the kinds."""
-    with pytest.raises(UasflyError, match="expected one of mission, airframe, scenario, plant, found 'aeroplane'"):
+    with pytest.raises(
+        UasflyError, match="expected one of mission, airframe, scenario, plant, camera, bundle, found 'aeroplane'"
+    ):
         schema_of("aeroplane")
 
 

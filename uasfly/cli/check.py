@@ -17,7 +17,9 @@ def register(app: typer.Typer) -> None:
 
 
 def check(
-    files: list[str] = typer.Argument(help="Mission, airframe, plant or scenario files, or shipped names."),
+    files: list[str] = typer.Argument(
+        help="Mission, airframe, scenario, plant, camera or bundle files, or shipped names."
+    ),
     airframe: options.Airframe = "f550",
     as_json: bool = typer.Option(False, "--json", help="Print a JSON list of findings."),
 ) -> None:
@@ -40,7 +42,7 @@ def check(
 
 
 def schema(
-    kind: str = typer.Argument(help="mission, airframe, scenario or plant."),
+    kind: str = typer.Argument(help="mission, airframe, scenario, plant, camera or bundle."),
     out: Path | None = typer.Option(None, "--out", help="Write to this file instead of the screen."),
 ) -> None:
     """Print the JSON Schema of a kind of file, for editors that complete and check YAML.

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from uasfly.airframe import Airframe
+from uasfly.bundle import Bundle
+from uasfly.camera import Camera
 from uasfly.errors import FileError, UasflyError, printable
 from uasfly.files import Kind, find_file, is_directory, is_file, load_file, top_level_fields, write_schema
 from uasfly.mission import Mission
@@ -20,13 +22,19 @@ MODELS: dict[Kind, type[Any]] = {
     "airframe": Airframe,
     "scenario": Scenario,
     "plant": Plant,
+    "camera": Camera,
+    "bundle": Bundle,
 }
+_NAMES = "mission, airframe, scenario, plant, camera or bundle"
+_ANY = "a mission, an airframe, a scenario, a plant, a camera or a bundle"
 # Fields that only one kind of file has: they tell what a file is meant to be.
 _SIGNS: dict[Kind, set[str]] = {
     "mission": {"legs", "takeoff", "ending", "transition"},
     "airframe": {"controller", "observer", "yaw_pid", "backup"},
     "scenario": {"wind", "sensors", "link"},
     "plant": {"inertia_kg_m2", "battery", "rotors"},
+    "camera": {"fx", "fy", "cx", "cy", "width_px", "height_px", "transform_camera_to_body"},
+    "bundle": {"markers", "family"},
 }
 
 
@@ -114,13 +122,13 @@ def _locate(name: str) -> tuple[Path, Kind]:
         fields = top_level_fields(path)
         kind = max(_SIGNS, key=lambda candidate: len(_SIGNS[candidate] & fields))
         if not _SIGNS[kind] & fields:
-            raise FileError(name, ["expected a mission, an airframe, a scenario or a plant, found fields of none"])
+            raise FileError(name, [f"expected {_ANY}, found fields of none"])
         return path, kind
-    for candidate in ("mission", "airframe", "scenario", "plant"):
+    for candidate in MODELS:
         try:
             return find_file(candidate, name), candidate
         except FileError:
             continue
     if is_directory(Path(name)):
         raise FileError(name, ["it is a directory; expected a file"])
-    raise FileError(name, ["no such file, and no mission, airframe, scenario or plant of this name is shipped"])
+    raise FileError(name, [f"no such file, and no {_NAMES} of this name is shipped"])
