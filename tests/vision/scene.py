@@ -1,0 +1,101 @@
+"""Pictures of printed boards as a camera sees them: each pixel averages rays, then blur and noise.
+
+Independent of the code under test but for the camera's rays: the board is a plane, its texture drawn cell by cell.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from uasfly.bundle import Bundle
+from uasfly.camera import Camera
+from uasfly.messages import Array
+from uasfly.vision.opencv_detector import dictionary_of
+
+DARK, BRIGHT, AROUND = 35.0, 215.0, 110.0
+
+
+def board_texture(bundle: Bundle, pixels_per_m: float) -> tuple[np.ndarray, Array]:
+    """Texture of a flat bundle of unturned OpenCV markers and the bundle coordinates (2,) of its left top edge."""
+    dictionary = dictionary_of(bundle.family)
+    cells = dictionary.markerSize + 2
+    quads = np.array([bundle.corners(marker.id)[:, :2] for marker in bundle.markers])
+    margin = 1.5 * max(marker.size_m for marker in bundle.markers) / cells
+    left, top = quads[..., 0].min() - margin, quads[..., 1].max() + margin
+    right, bottom = quads[..., 0].max() + margin, quads[..., 1].min() - margin
+    shape = (round((top - bottom) * pixels_per_m), round((right - left) * pixels_per_m))
+    texture = np.full(shape, BRIGHT, dtype=np.float32)
+    for marker in bundle.markers:
+        bits = cv2.aruco.generateImageMarker(dictionary, marker.id, cells)
+        x, y = marker.position_m[0] - 0.5 * marker.size_m, marker.position_m[1] + 0.5 * marker.size_m
+        for row in range(cells):
+            for column in range(cells):
+                if bits[row, column] < 128:
+                    edges = [
+                        round((x + column * marker.size_m / cells - left) * pixels_per_m),
+                        round((x + (column + 1) * marker.size_m / cells - left) * pixels_per_m),
+                        round((top - y + row * marker.size_m / cells) * pixels_per_m),
+                        round((top - y + (row + 1) * marker.size_m / cells) * pixels_per_m),
+                    ]
+                    texture[edges[2] : edges[3], edges[0] : edges[1]] = DARK
+    return texture, np.array((left, top))
+
+
+def render(
+    bundle: Bundle,
+    camera: Camera,
+    rotation: Array,
+    position: Array,
+    rng: np.random.Generator,
+    *,
+    blur_px: float = 0.9,
+    noise: float = 4.0,
+    supersampling: int = 4,
+    pixels_per_m: float = 2000.0,
+) -> np.ndarray:
+    """Picture (h, w) uint8 of the bundle at rotation (3, 3), position (3,) [m] in camera axes."""
+    texture, (left, top) = board_texture(bundle, pixels_per_m)
+    height, width = texture.shape
+    board = np.array(((0, 0), (width, 0), (width, height), (0, height))) / pixels_per_m
+    outline = np.column_stack((left + board[:, 0], top - board[:, 1], np.zeros(4)))
+    seen = camera.project(outline @ rotation.T + position)
+    low = np.clip(np.floor(seen.min(axis=0)) - 8, 0, (camera.width_px - 1, camera.height_px - 1)).astype(int)
+    high = np.clip(np.ceil(seen.max(axis=0)) + 9, 1, (camera.width_px, camera.height_px)).astype(int)
+    fine = (np.arange(supersampling) + 0.5) / supersampling - 0.5
+    u = (np.arange(low[0], high[0])[:, None] + fine).ravel()
+    v = (np.arange(low[1], high[1])[:, None] + fine).ravel()
+    grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+    rays = camera.unproject(grid)
+    normal = rotation[:, 2]
+    points = rays * ((normal @ position) / (rays @ normal))[:, None]
+    flat = (points - position) @ rotation
+    maps = np.column_stack(((flat[:, 0] - left), (top - flat[:, 1]))) * pixels_per_m - 0.5
+    values = _interpolated(cv2.copyMakeBorder(texture, 2, 2, 2, 2, cv2.BORDER_CONSTANT, value=AROUND), maps + 2)
+    shape = (high[1] - low[1], supersampling, high[0] - low[0], supersampling)
+    picture = np.full((camera.height_px, camera.width_px), AROUND, dtype=np.float32)
+    picture[low[1] : high[1], low[0] : high[0]] = values.reshape(shape).mean(axis=(1, 3))
+    if blur_px > 0.0:
+        picture = cv2.GaussianBlur(picture, (0, 0), blur_px)
+    picture = picture + rng.normal(0.0, noise, picture.shape).astype(np.float32)
+    return np.clip(np.round(picture), 0, 255).astype(np.uint8)
+
+
+def _interpolated(texture: np.ndarray, places: Array) -> Array:
+    """Bilinear, by hand: cv2.remap gives NaN here and there in OpenCV 5.0."""
+    height, width = texture.shape
+    x, y = np.clip(places, 0.0, (width - 1.001, height - 1.001)).T
+    column, row = x.astype(int), y.astype(int)
+    x, y = x - column, y - row
+    above = texture[row, column] * (1 - x) + texture[row, column + 1] * x
+    below = texture[row + 1, column] * (1 - x) + texture[row + 1, column + 1] * x
+    return above * (1 - y) + below * y
+
+
+def facing_rotation(rng: np.random.Generator, tilt_deg: float) -> Array:
+    """Rotation (3, 3) bundle to camera of a board that faces the camera upright, tilted by up to `tilt_deg`."""
+    facing = np.diag((1.0, -1.0, -1.0))
+    axis = rng.normal(size=3) * (1.0, 1.0, 0.6)
+    axis /= np.linalg.norm(axis)
+    tilt, _ = cv2.Rodrigues(axis * np.radians(rng.uniform(0.0, tilt_deg)))
+    return tilt @ facing

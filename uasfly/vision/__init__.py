@@ -1,0 +1,1 @@
+"""Vision: camera frames to poses of fiducial markers relative to the body."""
