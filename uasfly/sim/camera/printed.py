@@ -17,14 +17,6 @@ from uasfly.errors import UasflyError
 from uasfly.messages import Array
 
 QUIET_CELLS = 1  # white around a marker, where its neighbours leave room for it
-_DICTIONARIES = {
-    "36h11": "DICT_APRILTAG_36h11",
-    "36h10": "DICT_APRILTAG_36h10",
-    "25h9": "DICT_APRILTAG_25h9",
-    "16h5": "DICT_APRILTAG_16h5",
-    "aruco_original": "DICT_ARUCO_ORIGINAL",
-    "aruco_mip_36h12": "DICT_ARUCO_MIP_36h12",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +68,10 @@ def marker_cells(family: str, marker_id: int) -> NDArray[np.uint8]:
     """
     import cv2
 
-    name = _DICTIONARIES.get(family, "DICT_" + family.removeprefix("aruco_").upper())
-    number = getattr(cv2.aruco, name, None)
+    plain = family.removeprefix("aruco_")
+    wanted = [f"dict_apriltag_{family}", f"dict_{plain}", f"dict_{family}"]  # their case differs between versions
+    numbers = {name.lower(): number for name, number in vars(cv2.aruco).items() if name.startswith("DICT_")}
+    number = next((numbers[name] for name in wanted if name in numbers), None)
     if number is None:
         raise UasflyError(
             f"the simulated camera cannot print markers of the family {family}; expected an AprilTag or ArUco family"
