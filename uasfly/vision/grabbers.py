@@ -111,11 +111,11 @@ class PacedGrabber:
         self._stopped = False
 
     def read(self) -> tuple[Image, float]:
-        """See `Grabber`; a frame counts as exposed when it is due."""
+        """See `Grabber`; a frame counts as exposed when it is due, and what is late is not made up for."""
         picture = self._pictures()
         if picture is None:
             raise EndOfFramesError("the last picture has been read")
-        self._due_s = max(self._due_s + self._period_s, self._clock() - self._period_s)
+        self._due_s = max(self._due_s + self._period_s, self._clock())
         while not self._stopped and (wait_s := self._due_s - self._clock()) > 0.0:
             time.sleep(min(wait_s, 0.1))
         return picture, self._due_s

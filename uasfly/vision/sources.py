@@ -145,13 +145,13 @@ def open_source(
     """
     if target.lower().startswith(STREAMS):
         return GrabbingSource(target, lambda: _open_stream(target), latency_s)
-    if target.isdecimal():
+    if target.isdecimal() and len(target) < 6:
         return _device(int(target), Path(f"/dev/video{int(target)}"), latency_s)
     path = Path(target)
     try:
         if path.is_char_device():
             return _device(target, path, latency_s)
-        if path.is_dir():
+        if target and path.is_dir():
             pictures: Grabber = folder(path, rate_hz or FOLDER_RATE_HZ, loop)
             return GrabbingSource(target, _once(pictures), latency_s)
         if path.is_file():
