@@ -15,10 +15,10 @@ from uasfly.camera import Camera
 from uasfly.messages import Array
 from uasfly.vision.detectors import Image
 
-_ALONG = np.linspace(0.08, 0.92, 64)  # places along an edge, away from the corners, where blur rounds it
-_ACROSS = np.linspace(-1.0, 1.0, 25)  # places along a profile, in half widths
-_PASSES = (1.1, 0.7, 0.7)  # half widths of the profiles, in border widths
-_WIDEST_PX, _NARROWEST_PX = 6.0, 1.5
+_ALONG = np.linspace(0.08, 0.92, 48)  # places along an edge, away from the corners, where blur rounds it
+_ACROSS = np.linspace(-1.0, 1.0, 17)  # places along a profile, in half widths
+_PASSES = (1.1, 0.6, 0.5)  # half widths of the profiles, in border widths
+_WIDEST_PX, _NARROWEST_PX = 6.0, 1.2
 _TUKEY = 4.685
 _LEAST_CONTRAST = 8.0  # grey values across an edge
 _UNREFINED_SIGMA_PX = 0.7  # of a contour's corner
@@ -147,7 +147,7 @@ def _nanmedian(values: Array) -> Array:
     count = np.isfinite(values).sum(axis=-1)
     ordered = np.sort(values, axis=-1)  # NaN last
     middle = np.take_along_axis(ordered, np.maximum(count // 2, 0)[..., None] % values.shape[-1], axis=-1)[..., 0]
-    return np.where(count > 0, np.nan_to_num(middle), 0.0)
+    return np.asarray(np.where(count > 0, np.nan_to_num(middle), 0.0), dtype=float)
 
 
 def _meeting_points(lines: Array) -> Array:
@@ -157,7 +157,8 @@ def _meeting_points(lines: Array) -> Array:
     x = before[..., 1] * lines[..., 2] - before[..., 2] * lines[..., 1]
     y = before[..., 2] * lines[..., 0] - before[..., 0] * lines[..., 2]
     with np.errstate(all="ignore"):
-        return np.where(np.abs(cross) > 0.05, np.stack((x, y)) / cross, np.nan).transpose(1, 2, 0)
+        meeting: Array = np.where(np.abs(cross) > 0.05, np.stack((x, y)) / cross, np.nan).transpose(1, 2, 0)
+    return meeting
 
 
 def _undistorted(points: Array, camera: Camera | None) -> Array:

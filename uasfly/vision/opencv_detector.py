@@ -16,8 +16,8 @@ from uasfly.vision.detectors import Image, border_of
 class OpenCvDetector:
     """Finds the markers of one dictionary.
 
-    The corners are the contour's, without OpenCV's own refinement: on small markers its sub-pixel search walks off to the
-    corners of neighbouring cells, and the line fit of `edges` needs no better start.
+    The corners are the contour's, without OpenCV's own refinement: on small markers its sub-pixel search walks off to
+    the corners of neighbouring cells, and the line fit of `edges` needs no better start.
 
     Args:
         dictionary: OpenCV's.
