@@ -26,21 +26,30 @@ from uasfly.sim.camera.simulated_camera import Arrivals
 
 @dataclass(frozen=True, slots=True)
 class DetectorFigures:
-    """What a detector does, as measured on rendered frames.
+    """What a detector does, as measured on rendered frames with the default noise and lens blur.
 
-    Attributes:
-        corner_sigma_px: error of a corner on each axis in a sharp picture.
-        corner_sigma_per_blur: what each pixel of motion blur adds to it, in the square.
-        least_cell_px: smallest cell of a marker that is found.
-        most_blur_cells: motion blur in cells beyond which a marker is not found.
-        least_cosine: of the angle between a marker's normal and the line of sight.
+    With c the size of a marker's cell and b the motion blur [px], the error of a corner on each axis is
+    hypot(floor_px, corner_px / c^2) * (1 + blur_growth * (b/c)^2) [px]; a marker is found with the probability
+    1 / (1 + exp(-(c - found_cell_px - found_per_blur * b) / found_width_px)).
     """
 
-    corner_sigma_px: float = 0.06
-    corner_sigma_per_blur: float = 0.02
-    least_cell_px: float = 2.5
-    most_blur_cells: float = 1.0
-    least_cosine: float = 0.2
+    floor_px: float = 0.008
+    corner_px: float = 0.55
+    blur_growth: float = 0.6
+    found_cell_px: float = 1.4
+    found_per_blur: float = 0.23
+    found_width_px: float = 0.12
+    least_cosine: float = 0.2  # of the angle between a marker's normal and the line of sight
+
+    def sigma_px(self, cell_px: float, blur_px: float) -> float:
+        """Error of a corner [px], an axis."""
+        sharp = math.hypot(self.floor_px, self.corner_px / cell_px**2)
+        return sharp * (1.0 + self.blur_growth * (blur_px / cell_px) ** 2)
+
+    def probability(self, cell_px: float, blur_px: float) -> float:
+        """Of being found."""
+        excess = (cell_px - self.found_cell_px - self.found_per_blur * blur_px) / self.found_width_px
+        return 1.0 / (1.0 + math.exp(-min(max(excess, -50.0), 50.0)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,30 +102,35 @@ class NoiseModelCamera:
         seen = self._seen(exposure, rotation, place)
         if not seen:
             return None
-        information = np.zeros((6, 6))
+        information, stated = np.zeros((6, 6)), np.zeros((6, 6))
         for marker_id, sigma_px in seen:
             points = self._bundle.corners(marker_id)
             _, by_point = self._camera.project_with_jacobian(points @ rotation.T + place)
             by_turn = by_point @ (-rotation @ np.array([skew(point) for point in points]))
             rows = np.concatenate((by_point, by_turn), axis=2).reshape(-1, 6)
             information += rows.T @ rows / sigma_px**2
-        covariance = np.asarray(np.linalg.inv(information), dtype=float)
-        error = np.linalg.cholesky(0.5 * (covariance + covariance.T)) @ self._rng.standard_normal(6)
-        return self._sample(exposure.exposed_s, rotation, place, error, covariance)
+            stated += rows.T @ rows / max(sigma_px, self._camera.pixel_sigma) ** 2
+        # information = L L': the inverse of L' makes errors of this covariance
+        error = np.linalg.solve(np.linalg.cholesky(information).T, self._rng.standard_normal(6))
+        return self._sample(exposure.exposed_s, rotation, place, error, np.asarray(np.linalg.inv(stated), dtype=float))
 
     def _sample(self, exposed_s: float, rotation: Array, place: Array, error: Array, covariance: Array) -> MarkerSample:
         """The pose as the solver tells it: through the mounting that the camera's file says."""
-        mounting = self._camera.transform_camera_to_body
-        to_body = np.eye(6)
-        to_body[:3, :3] = mounting.rotation
+        camera, mounting = self._camera, self._camera.transform_camera_to_body
         turned = quaternion_product(mounting.unit_quaternion, _quaternion(rotation))
         wrong = quaternion_inverse(quaternion_from_rotation_vector(error[3:]))
+        to_body = np.eye(6)
+        to_body[:3, :3] = mounting.rotation
+        by_turn = np.vstack((-mounting.rotation @ skew(place), rotation.T))
+        total = to_body @ covariance @ to_body.T
+        total += math.radians(camera.mounting_sigma_deg) ** 2 * by_turn @ by_turn.T
+        total[:3, :3] += camera.mounting_sigma_m**2 * np.eye(3)
         return MarkerSample(
             exposed_s,
             self._bundle.marker_id,
             mounting.position + mounting.rotation @ (place - error[:3]),
             quaternion_product(turned, wrong),
-            to_body @ covariance @ to_body.T,
+            0.5 * (total + total.T),
         )
 
     def _seen(self, exposure: Exposure, rotation: Array, place: Array) -> Sequence[tuple[int, float]]:
@@ -136,9 +150,8 @@ class NoiseModelCamera:
             cell_px = float(sides.min()) / self._cells[marker.id]
             ends = [self._displaced(exposure, points, offset_s) for offset_s in (-half_s, half_s)]
             blur_px = float(np.linalg.norm(camera.project(ends[1]) - camera.project(ends[0]), axis=1).max())
-            if cell_px < figures.least_cell_px or not blur_px < figures.most_blur_cells * cell_px:
-                continue
-            seen.append((marker.id, math.hypot(figures.corner_sigma_px, figures.corner_sigma_per_blur * blur_px)))
+            if math.isfinite(blur_px) and self._rng.random() < figures.probability(cell_px, blur_px):
+                seen.append((marker.id, figures.sigma_px(cell_px, blur_px)))
         return seen
 
     def _displaced(self, exposure: Exposure, points: Array, offset_s: float) -> Array:
