@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import socket
 import threading
 import time
@@ -217,3 +218,37 @@ def test_a_camera_process_that_cannot_start_says_why() -> None:
     bundle = Bundle.model_validate({"name": "s", "family": "stag_hd21", "markers": [{"id": 0, "size_m": 0.1}]})
     with pytest.raises(LinkError, match="cannot print markers of the family stag_hd21"):
         CameraProcess(views.camera(), bundle, views.clean(), seed=1)
+
+
+def test_a_vehicle_over_mavlink_has_its_camera_beside_it() -> None:
+    """The vehicle's process tells the stream's URL; its frames carry the host's time; both end together."""
+    from uasfly.files import find_file, load_file
+    from uasfly.sim.mavlink.process import start_process
+    from uasfly.sim.plant import Plant
+    from uasfly.sim.scenario import Scenario
+    from uasfly.vision.mjpeg_reader import MjpegGrabber
+
+    down = {"position_m": (0.0, 0.0, 0.5), "rpy_deg": (180.0, 0.0, -90.0)}
+    camera = views.camera(latency_s=0.02, transform_camera_to_body=down)
+    settings = views.clean(bundle={"on": "floor", "position_m": (0.0, 0.0, 0.0)})
+    plant = load_file(find_file("plant", "f550"), Plant)
+    scenario = Scenario(name="test", camera=settings)
+    with start_process(plant, scenario, 1, remote_port=_free_port(), camera=camera, bundle=views.single()) as vehicle:
+        grabber = MjpegGrabber(vehicle.camera_url)
+        times = []
+        for _ in range(5):
+            image, exposed_s = grabber.read()
+            assert exposed_s is not None
+            times.append(exposed_s)
+        grabber.release()
+    assert all(later > earlier for earlier, later in itertools.pairwise(times))
+    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11))
+    assert np.ravel(detector.detectMarkers(image)[1]).tolist() == [5]
+    with pytest.raises(OSError, match="refused"):
+        socket.create_connection(("127.0.0.1", int(vehicle.camera_url.split(":")[2].split("/")[0])), timeout=1.0)
+
+
+def _free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
