@@ -88,7 +88,7 @@ class Camera(FileModel):
     ] = 0.0
     pixel_sigma: Annotated[
         float, Field(gt=0.0, le=10.0, description="smallest error of a marker's corner that is believed [px]")
-    ] = 0.05
+    ] = 0.15
     transform_camera_to_body: Annotated[
         Placement, Field(description="of the optical axes (x right, y down, z forward) in the body's (FLU)")
     ]
@@ -114,6 +114,11 @@ class Camera(FileModel):
     def coefficients(self) -> Array:
         """(n,) of the distortion as OpenCV takes them; zeros where there is none."""
         return np.array(self.distortion or (0.0, 0.0, 0.0, 0.0), dtype=float)
+
+    @cached_property
+    def keeps_lines(self) -> bool:
+        """Whether straight lines are straight in the picture: a pinhole without distortion."""
+        return self.model == "pinhole" and not any(self.distortion)
 
     def project(self, points_in_camera: Array) -> Array:
         """Pixels (n, 2) of points (n, 3) [m, camera axes]; NaN for what is not in front of the camera."""
@@ -142,7 +147,7 @@ class Camera(FileModel):
         """
         target = np.asarray(pixels, dtype=float).reshape(-1, 2)
         plane = (target - (self.cx, self.cy)) / (self.fx, self.fy)
-        if not any(self.distortion) and self.model == "pinhole":
+        if self.keeps_lines:
             rays = np.column_stack((plane, np.ones(len(plane))))
             return _unit(rays)
         if self.model == "fisheye":
@@ -177,7 +182,7 @@ class Camera(FileModel):
         return plane
 
     def _project_front(self, points: Array, want_jacobian: bool) -> tuple[Array, Array | None]:
-        if self.model == "pinhole" and not any(self.distortion):
+        if self.keeps_lines:
             x, y, z = points.T
             pixels = np.column_stack((self.fx * x / z + self.cx, self.fy * y / z + self.cy))
             if not want_jacobian:

@@ -51,7 +51,7 @@ def render(
     *,
     blur_px: float = 0.9,
     noise: float = 4.0,
-    supersampling: int = 4,
+    supersampling: int = 3,
     pixels_per_m: float = 2000.0,
 ) -> np.ndarray:
     """Picture (h, w) uint8 of the bundle at rotation (3, 3), position (3,) [m] in camera axes."""
@@ -62,29 +62,31 @@ def render(
     seen = camera.project(outline @ rotation.T + position)
     low = np.clip(np.floor(seen.min(axis=0)) - 8, 0, (camera.width_px - 1, camera.height_px - 1)).astype(int)
     high = np.clip(np.ceil(seen.max(axis=0)) + 9, 1, (camera.width_px, camera.height_px)).astype(int)
+    u, v = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
+    plane = camera.normalise(np.column_stack((u.ravel(), v.ravel()))).reshape(*u.shape, 2)
+    down, across = np.gradient(plane, axis=(0, 1))  # within a pixel the lens is straight
+    texture = cv2.copyMakeBorder(texture, 2, 2, 2, 2, cv2.BORDER_CONSTANT, value=AROUND)
+    normal, total = rotation[:, 2], np.zeros(u.shape)
     fine = (np.arange(supersampling) + 0.5) / supersampling - 0.5
-    u = (np.arange(low[0], high[0])[:, None] + fine).ravel()
-    v = (np.arange(low[1], high[1])[:, None] + fine).ravel()
-    grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
-    rays = camera.unproject(grid)
-    normal = rotation[:, 2]
-    points = rays * ((normal @ position) / (rays @ normal))[:, None]
-    flat = (points - position) @ rotation
-    maps = np.column_stack(((flat[:, 0] - left), (top - flat[:, 1]))) * pixels_per_m - 0.5
-    values = _interpolated(cv2.copyMakeBorder(texture, 2, 2, 2, 2, cv2.BORDER_CONSTANT, value=AROUND), maps + 2)
-    shape = (high[1] - low[1], supersampling, high[0] - low[0], supersampling)
+    for dx in fine:
+        for dy in fine:
+            x, y = np.moveaxis(plane + dx * across + dy * down, -1, 0)
+            depth = (normal @ position) / (normal[0] * x + normal[1] * y + normal[2])
+            ray = np.stack((x * depth, y * depth, depth), axis=-1) - position
+            right, up = ray @ rotation[:, 0], ray @ rotation[:, 1]
+            total += _interpolated(texture, (right - left) * pixels_per_m + 1.5, (top - up) * pixels_per_m + 1.5)
     picture = np.full((camera.height_px, camera.width_px), AROUND, dtype=np.float32)
-    picture[low[1] : high[1], low[0] : high[0]] = values.reshape(shape).mean(axis=(1, 3))
+    picture[low[1] : high[1], low[0] : high[0]] = total / supersampling**2
     if blur_px > 0.0:
         picture = cv2.GaussianBlur(picture, (0, 0), blur_px)
     picture = picture + rng.normal(0.0, noise, picture.shape).astype(np.float32)
     return np.clip(np.round(picture), 0, 255).astype(np.uint8)
 
 
-def _interpolated(texture: np.ndarray, places: Array) -> Array:
+def _interpolated(texture: np.ndarray, x: Array, y: Array) -> Array:
     """Bilinear, by hand: cv2.remap gives NaN here and there in OpenCV 5.0."""
     height, width = texture.shape
-    x, y = np.clip(places, 0.0, (width - 1.001, height - 1.001)).T
+    x, y = np.clip(x, 0.0, width - 1.001), np.clip(y, 0.0, height - 1.001)
     column, row = x.astype(int), y.astype(int)
     x, y = x - column, y - row
     above = texture[row, column] * (1 - x) + texture[row, column + 1] * x

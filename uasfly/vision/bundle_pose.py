@@ -2,7 +2,7 @@
 
 Each marker alone has two poses; each gives a hypothesis about the bundle. The one that most markers agree with is
 refined on all of their corners, markers that do not fit are taken out one by one. A flat bundle far away may still be
-seen in two ways: the second is refined too, the prediction tells them apart, and the covariance says what doubt is left.
+seen in two ways: the second is refined too, the prediction tells them apart, the covariance holds the doubt left.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def solve_bundle(
         bundle: the markers and their places.
         camera: the lens.
         detections: markers of the bundle's family.
-        prediction: the bundle's pose in camera axes as the filter expects it: tells the two poses of a flat marker apart.
+        prediction: its pose in camera axes as the filter expects it; tells the two poses of a flat marker apart.
     """
     entries, left_out = _plausible(bundle, camera, detections)
     active = _agreeing(camera, entries, prediction)

@@ -16,7 +16,7 @@ from uasfly.vision.pose import Pose
 
 Reason = Literal["not in the bundle", "torn", "moved", "wrong size", "wrong id", "seen twice", "contradicts"]
 
-_TOLERANCE_PX = 0.8  # of a marker's corners, RMS: print, mounting and lens are never perfect
+_TOLERANCE_PX = 1.2  # of a marker's corners, RMS: print, mounting and lens are never perfect
 _TOLERANCE_SIDE = 0.02  # the same as a fraction of its side in the picture
 _TOLERANCE_SIGMAS = 5.0
 _LEAST_SIDE_PX = 5.0
@@ -74,7 +74,7 @@ def implausible(detection: Detection, square_residual_px: float | None) -> str:
         return f"its edges are not straight ({detection.straightness_px:.1f} px)"
     if square_residual_px is None:
         return "no square looks like this"
-    if square_residual_px > max(2.0 * _TOLERANCE_PX, 0.04 * side, _TOLERANCE_SIGMAS * detection.sigma_px):
+    if square_residual_px > max(2.0, 0.04 * side, _TOLERANCE_SIGMAS * detection.sigma_px):
         return f"its corners are {square_residual_px:.1f} px off those of a square"
     return ""
 

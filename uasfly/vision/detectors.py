@@ -1,7 +1,7 @@
 """What every marker detector gives, and which one reads which family of markers.
 
-Corners are in OpenCV's convention whatever library found them: the centre of the top-left pixel is (0, 0), and the order
-is top-left, top-right, bottom-right, bottom-left of the upright marker seen from the front.
+Corners are in OpenCV's convention whatever library found them: the centre of the top-left pixel is (0, 0); the order is
+top-left, top-right, bottom-right, bottom-left of the upright marker seen from the front.
 """
 
 from __future__ import annotations

@@ -146,7 +146,8 @@ def _nanmedian(values: Array) -> Array:
     """Median along the last axis of what is not NaN; 0 where nothing is."""
     count = np.isfinite(values).sum(axis=-1)
     ordered = np.sort(values, axis=-1)  # NaN last
-    middle = np.take_along_axis(ordered, np.maximum(count // 2, 0)[..., None] % values.shape[-1], axis=-1)[..., 0]
+    place = np.maximum(count // 2, 0)[..., None] % values.shape[-1]
+    middle = np.take_along_axis(ordered, place, axis=-1)[..., 0]
     return np.asarray(np.where(count > 0, np.nan_to_num(middle), 0.0), dtype=float)
 
 
@@ -157,19 +158,19 @@ def _meeting_points(lines: Array) -> Array:
     x = before[..., 1] * lines[..., 2] - before[..., 2] * lines[..., 1]
     y = before[..., 2] * lines[..., 0] - before[..., 0] * lines[..., 2]
     with np.errstate(all="ignore"):
-        meeting: Array = np.where(np.abs(cross) > 0.05, np.stack((x, y)) / cross, np.nan).transpose(1, 2, 0)
-    return meeting
+        meeting = np.where(np.abs(cross) > 0.05, np.stack((x, y)) / cross, np.nan)
+    return np.asarray(meeting.transpose(1, 2, 0), dtype=float)
 
 
 def _undistorted(points: Array, camera: Camera | None) -> Array:
-    if camera is None or not any(camera.distortion):
+    if camera is None or camera.keeps_lines:
         return points
     plane = camera.normalise(points.reshape(-1, 2)).reshape(points.shape)
     return plane * (camera.fx, camera.fy) + np.array((camera.cx, camera.cy))
 
 
 def _distorted(points: Array, camera: Camera | None) -> Array:
-    if camera is None or not any(camera.distortion):
+    if camera is None or camera.keeps_lines:
         return points
     plane = (points.reshape(-1, 2) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
     return camera.project(np.column_stack((plane, np.ones(len(plane))))).reshape(points.shape)
