@@ -14,7 +14,7 @@ from typing import Any, Generic, Protocol, TypeAlias, TypeVar
 from uasfly.errors import describe_error
 from uasfly.vision.frames import WARNING, Announcement, Frame, FrameSource
 
-NICENESS = 5
+NICENESS = 10
 BEAT_S = 0.5  # it says something at least so often
 _NAP_S = 0.002
 
@@ -27,7 +27,7 @@ Prediction_contra = TypeVar("Prediction_contra", contravariant=True)
 class Looker(Protocol[Prediction_contra, Result_co]):
     """What is done with a frame; its results are pickled."""
 
-    def __call__(self, frame: Frame, prediction: Prediction_contra | None) -> Result_co:
+    def __call__(self, frame: Frame, prediction: Prediction_contra | None, /) -> Result_co:
         """Look at a frame, where the prediction says, or everywhere."""
         ...
 
