@@ -13,7 +13,7 @@ from uasfly.files import find_file, load_file, shipped_names
 def test_corners_run_from_top_left_clockwise_seen_from_the_front() -> None:
     """X right, y up, z towards the viewer."""
     bundle = load_file(find_file("bundle", "four_36h11"), Bundle)
-    expected = ((0.05, 0.25, 0.0), (0.25, 0.25, 0.0), (0.25, 0.05, 0.0), (0.05, 0.05, 0.0))
+    expected = ((0.1, 0.3, 0.0), (0.3, 0.3, 0.0), (0.3, 0.1, 0.0), (0.1, 0.1, 0.0))
     np.testing.assert_allclose(bundle.corners(1), expected)
     assert bundle.marker_id == 0
 

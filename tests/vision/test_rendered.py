@@ -46,7 +46,7 @@ def _errors_m(name: str, distance_m: float, lens: Camera, pictures: int = 5, det
         guess = pose.moved(np.concatenate((rng.normal(0, 0.05, 3), rng.normal(0, np.radians(2.0), 3))))
         sight = solve_bundle(board, lens, detect_markers(image, detector, lens), guess)
         assert sight.pose is not None
-        assert len(sight.used) == len(board.markers)
+        assert len(sight.used) >= min(3, len(board.markers))  # a corner of the board may be out of sight
         assert not sight.left_out
         errors.append(np.linalg.norm(sight.pose.minus(pose)[:3]))
     return np.array(errors)

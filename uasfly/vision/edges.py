@@ -166,7 +166,7 @@ def _undistorted(points: Array, camera: Camera | None) -> Array:
     if camera is None or camera.keeps_lines:
         return points
     plane = camera.normalise(points.reshape(-1, 2)).reshape(points.shape)
-    return plane * (camera.fx, camera.fy) + np.array((camera.cx, camera.cy))
+    return np.asarray(plane * (camera.fx, camera.fy) + (camera.cx, camera.cy), dtype=float)
 
 
 def _distorted(points: Array, camera: Camera | None) -> Array:
