@@ -14,6 +14,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from uasfly.airframe import FileModel, NonNegative, Positive
+from uasfly.sim.camera.settings import CameraSettings
 from uasfly.sim.faults import Fault
 from uasfly.sim.wind.settings import Vector, WindSettings
 
@@ -102,4 +103,7 @@ class Scenario(FileModel):
     wind: WindSettings = WindSettings()
     sensors: Sensors = Sensors(position="mocap", position_noise_m=0.01)
     link: Link = Link()
+    camera: Annotated[
+        CameraSettings | None, Field(description="what the simulated camera meets, where there is one")
+    ] = None
     faults: Annotated[tuple[Fault, ...], Field(max_length=200, description="what goes wrong, and when")] = ()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from array import array
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -59,6 +60,8 @@ class SimulatedVehicle:
 
     Attributes:
         step_s: length of a step. parameters: PX4's parameters, name -> (type, value). boots: how often it has started.
+        watcher: called after each step with the time since the simulation began, the true state (see
+            `dynamics.PlantDynamics`) and the time since the first offboard, None before; for a camera on the vehicle.
     """
 
     step_s = STEP_S
@@ -87,6 +90,7 @@ class SimulatedVehicle:
         self._jumped_s = 0.0
         self._quality: tuple[float, int] | None = None
         self.boots = 0
+        self.watcher: Callable[[float, Sequence[float], float | None], None] | None = None
         self._faults = FaultBoard(self, scenario.faults, np.random.default_rng(fault_seed))
         self._boot(estimate_seed, sensor_seed)
 
@@ -165,6 +169,8 @@ class SimulatedVehicle:
         self._steps = steps + 1
         self._estimate.advance()
         self._sensors.advance()
+        if self.watcher is not None:
+            self.watcher((steps + 1) * STEP_S, state, None if engaged is None else now + STEP_S - engaged)
 
     def _run_away(self) -> str:
         return (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import gc
 import json
 import os
@@ -9,8 +10,12 @@ import select
 import sys
 import threading
 from queue import SimpleQueue
+from typing import Any
 
+from uasfly.bundle import Bundle
+from uasfly.camera import Camera
 from uasfly.errors import UasflyError
+from uasfly.sim.camera.process import CameraProcess
 from uasfly.sim.fault_lines import FaultLines
 from uasfly.sim.faults import Fault
 from uasfly.sim.mavlink.server import serve
@@ -38,18 +43,35 @@ def main() -> None:
             tuple(job["start_position"]),
             job["start_yaw_rad"],
         )
+        camera = _start_camera(job)
+        if camera is not None:
+            vehicle.watcher = camera.feed.watch
         gc.collect()
         gc.freeze()  # what lives now lives to the end: collecting it again would only delay telemetry
         remote = (job["remote"][0], job["remote"][1])
-        report = serve(vehicle, remote, job["local_port"], job["system_id"], stop, _say_ready, injected)
+        advanced = None if camera is None else camera.feed.send
+        ready = functools.partial(_say_ready, camera)
+        try:
+            report = serve(vehicle, remote, job["local_port"], job["system_id"], stop, ready, injected, advanced)
+        finally:
+            if camera is not None:
+                camera.stop()
     except UasflyError as error:
         print(error, file=sys.stderr, flush=True)
         sys.exit(USER_ERROR)
     print(json.dumps(report.as_dict()), flush=True)
 
 
-def _say_ready(local_port: int) -> None:
-    print(f"ready {local_port}", flush=True)
+def _start_camera(job: dict[str, Any]) -> CameraProcess | None:
+    scenario = Scenario.model_validate_json(job["scenario"])
+    if job["camera"] is None or scenario.camera is None:
+        return None
+    camera, bundle = Camera.model_validate_json(job["camera"]), Bundle.model_validate_json(job["bundle"])
+    return CameraProcess(camera, bundle, scenario.camera, job["seed"], job["camera_port"])
+
+
+def _say_ready(camera: CameraProcess | None, local_port: int) -> None:
+    print(f"ready {local_port}" if camera is None else f"ready {local_port} {camera.url}", flush=True)
 
 
 def _read_line() -> bytes:

@@ -19,6 +19,8 @@ import time
 from types import TracebackType
 from typing import IO, Self
 
+from uasfly.bundle import Bundle
+from uasfly.camera import Camera
 from uasfly.errors import LinkError
 from uasfly.sim.faults import Fault
 from uasfly.sim.mavlink.channel import DEFAULT_REMOTE
@@ -35,6 +37,7 @@ class SimulatedVehicleProcess:
 
     Attributes:
         local_port: UDP port on which the vehicle listens, 0 before it does.
+        camera_url: of its camera's stream, "" without a camera.
         report: what the vehicle has done, None until it has been stopped.
     """
 
@@ -42,6 +45,7 @@ class SimulatedVehicleProcess:
         self._process = process
         self._complaints = complaints
         self.local_port = 0
+        self.camera_url = ""
         self.report: ServerReport | None = None
 
     @property
@@ -113,7 +117,9 @@ class SimulatedVehicleProcess:
                 error.add_note(words)
                 raise error
             line += piece
-        self.local_port = int(line.split()[1])
+        words_said = line.decode().split()
+        self.local_port = int(words_said[1])
+        self.camera_url = words_said[2] if len(words_said) > 2 else ""
 
     def __enter__(self) -> Self:
         return self
@@ -135,6 +141,9 @@ def start_process(
     start_position: tuple[float, float, float] = (0.0, 0.0, 0.0),
     start_yaw_rad: float = 0.0,
     ready_timeout_s: float = READY_TIMEOUT_S,
+    camera: Camera | None = None,
+    bundle: Bundle | None = None,
+    camera_port: int = 0,
 ) -> SimulatedVehicleProcess:
     """Start a simulated vehicle in a process of its own and wait until it answers.
 
@@ -152,6 +161,9 @@ def start_process(
         start_position: (3,) m, world.
         start_yaw_rad: 0 = east, counter-clockwise.
         ready_timeout_s: how long to wait for it.
+        camera: its camera, served as an MJPEG stream where the scenario has a section `camera`.
+        bundle: what the camera looks at; needed with `camera`.
+        camera_port: TCP port of that stream, 0 for any that is free.
 
     Raises:
         LinkError: it could not start; the text says why.
@@ -166,6 +178,9 @@ def start_process(
         "start_position": start_position,
         "start_yaw_rad": start_yaw_rad,
         "parent_pid": os.getpid(),
+        "camera": None if camera is None or bundle is None else camera.model_dump_json(exclude_none=True),
+        "bundle": None if bundle is None else bundle.model_dump_json(exclude_none=True),
+        "camera_port": camera_port,
     }
     complaints = tempfile.TemporaryFile()  # noqa: SIM115 - the handle reads it as long as it lives
     process = subprocess.Popen(

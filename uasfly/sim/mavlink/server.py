@@ -68,6 +68,7 @@ class Server:
         clock: seconds, monotonic.
         warn: takes one line when the vehicle first falls behind the clock.
         injected: faults that are to begin now; they may be put there from any thread.
+        advanced: called after each advance with the time on `clock` at which the vehicle is where it is now.
 
     Raises:
         LinkError: the port is taken or the host unknown.
@@ -82,7 +83,9 @@ class Server:
         clock: Callable[[], float] = time.monotonic,
         warn: Callable[[str], None] | None = None,
         injected: SimpleQueue[Fault] | None = None,
+        advanced: Callable[[float], None] | None = None,
     ) -> None:
+        self._advanced = advanced
         self._identity = identity = Identity(system_id)
         self._injected = injected or SimpleQueue()
         self._vehicle = vehicle
@@ -115,6 +118,8 @@ class Server:
         self._inject()
         self._advance()
         self._follow_clock()
+        if self._advanced is not None:
+            self._advanced(self._epoch_s + self._vehicle.time_s)
         self._receive()
         if self._clock() < self._silent_until_s:
             return
@@ -202,6 +207,7 @@ def serve(
     stop: threading.Event | None = None,
     ready: Callable[[int], None] | None = None,
     injected: SimpleQueue[Fault] | None = None,
+    advanced: Callable[[float], None] | None = None,
 ) -> ServerReport:
     """Serve a vehicle in real time until `stop` is set, or SIGINT or SIGTERM arrives.
 
@@ -213,12 +219,13 @@ def serve(
         stop: ends serving when set.
         ready: called with the local port once clients are answered.
         injected: see `Server`.
+        advanced: see `Server`.
 
     Raises:
         LinkError: the port is taken or the host unknown.
     """
     stop = stop or threading.Event()
-    server = Server(vehicle, remote, local_port, system_id, injected=injected)
+    server = Server(vehicle, remote, local_port, system_id, injected=injected, advanced=advanced)
     with _ended_by_signals(stop):
         if ready is not None:
             ready(server.channel.local_port)

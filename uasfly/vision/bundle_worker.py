@@ -1,0 +1,49 @@
+"""A bundle followed in the frames of a camera, in a process beside the control cycle."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+
+from uasfly.bundle import Bundle
+from uasfly.camera import Camera
+from uasfly.errors import UasflyError
+from uasfly.vision.frames import Frame
+from uasfly.vision.sources import open_source
+from uasfly.vision.tracker import BundleTracker, Look, MarkerPrediction
+from uasfly.vision.worker import DetectionWorker
+from uasfly.vision.worker_process import Job
+
+Looking = Callable[[Frame, MarkerPrediction | None], Look]
+
+
+def watch_bundle(
+    camera: Camera, bundle: Bundle, target: str, rate_hz: float | None = None, loop: bool = False
+) -> DetectionWorker[MarkerPrediction, Look]:
+    """Follow a bundle in the frames that a camera source gives.
+
+    Args:
+        camera: lens, mounting, and the latency of frames that carry no time stamp.
+        bundle: the markers.
+        target: what `open_source` opens; a source that is none is announced, not raised.
+        rate_hz: pictures a second from a file or folder.
+        loop: begin a folder again after its last picture.
+    """
+    opener = functools.partial(open_source, target, camera.latency_s, rate_hz, loop)
+    job: Job[MarkerPrediction, Look] = Job(opener, functools.partial(_make_looking, camera, bundle))
+    return DetectionWorker(job)
+
+
+def _make_looking(camera: Camera, bundle: Bundle) -> Looking:
+    tracker = BundleTracker(camera, bundle)
+
+    def look(frame: Frame, prediction: MarkerPrediction | None) -> Look:
+        height, width = frame.image.shape
+        if (width, height) != (camera.width_px, camera.height_px):
+            raise UasflyError(
+                f"expected pictures of {camera.width_px} x {camera.height_px} as the camera file {camera.name} says, "
+                f"found {width} x {height}; set the camera's resolution, or calibrate for this one"
+            )
+        return tracker.look(frame.image, frame.exposed_s, prediction)
+
+    return look
