@@ -96,7 +96,7 @@ class QpOptions:
     interior_iterations: int = 50
     polish_sweeps: int = 3
     bound_tolerance: float = 1e-9
-    start_barrier: float = 1e3
+    start_barrier: float = 10.0
     early_gap: float = 1e-3
     final_gap: float = 1e-11
     loose_gap: float = 1e-5

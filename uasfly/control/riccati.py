@@ -28,8 +28,9 @@ class StageFunctions:
     """The stage of each sweep; what is carried from stage to stage comes first in arguments and results.
 
     Attributes:
-        backward: (P, p, J, c, q, r, Q, R, free, fixed) -> (P, p, K, k, Hux, Huu, hu); where free = 0, du = fixed.
-        forward: (dx, J, c, K, k, Hux, Huu, hu, free, fixed) -> (dx+, du, gradient of the cost by du).
+        backward: (P, p, J, c, q, r, Q, R, free, fixed) -> (P, p, K, k, Hux, Huu, hu); where free = 0,
+            du = fixed; elsewhere fixed = 0.
+        forward: (dx, J, c, K, k, Hux, Huu, hu, fixed) -> (dx+, du, gradient of the cost by du).
         barrier_backward: (P, p, J, c, q, r, Q, R) -> (P, p, K, k, factor, P c), every input free.
         barrier_vector: (p, J, P c, q, r, K, factor) -> (p, k), again with other q, r and the same factor.
         barrier_forward: (dx, J, c, K, k) -> (dx+, du).
@@ -121,13 +122,8 @@ def stage_functions(pattern: JacobianPattern) -> StageFunctions:
     a, b = jacobian[:, :STATES], jacobian[:, STATES:]
 
     hessian = _symmetric(cost, STATES)
-    carried = hessian @ jacobian
-    cost_of_defect = hessian @ defect
-    ahead = cost_of_defect + slope
-    h_xx = ca.diag(weight_x) + a.T @ carried[:, :STATES]
-    h_ux = b.T @ carried[:, :STATES]
-    h_uu = ca.diag(weight_u) + b.T @ carried[:, STATES:]
-    h_u, h_x = r + b.T @ ahead, q + a.T @ ahead
+    carried_x, carried_u = hessian @ a, hessian @ b
+    h_xx, h_ux, h_uu = ca.diag(weight_x) + a.T @ carried_x, carried_u.T @ a, ca.diag(weight_u) + b.T @ carried_u
 
     def eliminate(uu: ca.SX, ux: ca.SX, u: ca.SX, x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, _Factor]:
         factor = _Factor.of(uu)
@@ -138,20 +134,22 @@ def stage_functions(pattern: JacobianPattern) -> StageFunctions:
         next_slope = x - half[:, :STATES].T @ scaled[:, STATES]
         return upper_triangle(next_cost), next_slope, ca.vec(gains[:, :STATES]), gains[:, STATES], factor
 
-    # A held input gets a row of the identity and no right hand side: gain and feed-forward come out zero.
-    held = (1.0 - free) * fixed
+    # A held input is part of the defect; it gets a row of the identity and no right hand side, so that gain and
+    # feed-forward come out zero.
     masked = ca.SX(INPUTS, INPUTS)
     for i in range(INPUTS):
         for k in range(INPUTS):
             masked[i, k] = free[i] * free[k] * h_uu[i, k] if i != k else free[i] * h_uu[i, i] + (1.0 - free[i])
-    p_next, s_next, big_k, small_k, _ = eliminate(
-        masked, ca.diag(free) @ h_ux, free * (h_u + h_uu @ held), h_x + h_ux.T @ held
-    )
+    ahead = hessian @ (defect + b @ fixed) + slope
+    h_u = r + weight_u * fixed + b.T @ ahead
+    p_next, s_next, big_k, small_k, _ = eliminate(masked, ca.diag(free) @ h_ux, free * h_u, q + a.T @ ahead)
     arguments = [cost, slope, packed, defect, q, r, weight_x, weight_u]
     results = [p_next, s_next, big_k, small_k, ca.vec(h_ux), upper_triangle(h_uu), h_u]
     backward = _function("uasfly_backward", [*arguments, free, fixed], results)
 
-    p_next, s_next, big_k, small_k, factor = eliminate(h_uu, h_ux, h_u, h_x)
+    cost_of_defect = hessian @ defect
+    ahead = cost_of_defect + slope
+    p_next, s_next, big_k, small_k, factor = eliminate(h_uu, h_ux, r + b.T @ ahead, q + a.T @ ahead)
     results = [p_next, s_next, big_k, small_k, factor.packed(), cost_of_defect]
     barrier_backward = _function("uasfly_barrier_backward", arguments, results)
 
@@ -167,11 +165,11 @@ def stage_functions(pattern: JacobianPattern) -> StageFunctions:
 
     ux_vector, uu_vector, u_vector = symbol("Hux", INPUTS * STATES), symbol("Huu", PACKED_INPUTS), symbol("hu", INPUTS)
     step = -(gain @ dx) - feedforward
-    inputs = step + (1.0 - free) * fixed
-    gradient = u_vector + ca.reshape(ux_vector, INPUTS, STATES) @ dx + _symmetric(uu_vector, INPUTS) @ inputs
+    inputs = step + fixed
+    gradient = u_vector + ca.reshape(ux_vector, INPUTS, STATES) @ dx + _symmetric(uu_vector, INPUTS) @ step
     forward = _function(
         "uasfly_forward",
-        [dx, packed, defect, gain_vector, feedforward, ux_vector, uu_vector, u_vector, free, fixed],
+        [dx, packed, defect, gain_vector, feedforward, ux_vector, uu_vector, u_vector, fixed],
         [a @ dx + b @ inputs + defect, inputs, gradient],
     )
     barrier_forward = _function(

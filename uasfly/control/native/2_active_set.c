@@ -6,10 +6,10 @@ static void hold(stage_t *stage, int i) {
   stage->fixed[i] = side < 0 ? stage->lower[i] : side > 0 ? stage->upper[i] : 0.0;
 }
 
-static void active_set_sweep(const problem_t *problem, stage_t *stages) {
+/* The backward part may start at the last stage whose held inputs changed: behind it the cost to go is what it was. */
+static void active_set_sweep(const problem_t *problem, stage_t *stages, int last) {
   int nodes = problem->nodes;
-  terminal_cost(problem, &stages[nodes]);
-  for (int k = nodes - 1; k >= 0; k--) {
+  for (int k = last; k >= 0; k--) {
     stage_t *s = &stages[k], *after = s + 1;
     const double *arguments[10] = {after->P, after->p, s->jacobian, s->defect, s->q, s->r,
                                    problem->state_weight + k * NX, problem->input_weight + k * NU, s->free, s->fixed};
@@ -18,7 +18,7 @@ static void active_set_sweep(const problem_t *problem, stage_t *stages) {
   }
   for (int k = 0; k < nodes; k++) {
     stage_t *s = &stages[k];
-    const double *arguments[10] = {s->dx, s->jacobian, s->defect, s->K, s->k, s->Hux, s->Huu, s->hu, s->free, s->fixed};
+    const double *arguments[9] = {s->dx, s->jacobian, s->defect, s->K, s->k, s->Hux, s->Huu, s->hu, s->fixed};
     double *results[3] = {s[1].dx, s->du, s->gradient};
     uasfly_forward(arguments, results, NONE);
   }
@@ -26,12 +26,13 @@ static void active_set_sweep(const problem_t *problem, stage_t *stages) {
 
 /* Returns how many inputs still changed sides in the last sweep: 0 when the set stands and the result is exact. */
 static int active_set(const problem_t *problem, stage_t *stages, int most, int *sweeps) {
-  int nodes = problem->nodes, changes = 1, last = 0;
+  int nodes = problem->nodes, changes = 1, before = 0, last = nodes - 1;
   double tolerance = problem->bound_tolerance;
   for (int k = 0; k < nodes; k++)
     for (int i = 0; i < NU; i++) hold(&stages[k], i);
+  terminal_cost(problem, &stages[nodes]);
   for (int sweep = 1; sweep <= most; sweep++) {
-    active_set_sweep(problem, stages);
+    active_set_sweep(problem, stages, last);
     ++*sweeps;
     changes = 0;
     for (int k = 0; k < nodes; k++) {
@@ -48,11 +49,12 @@ static int active_set(const problem_t *problem, stage_t *stages, int most, int *
           s->active[i] = side;
           hold(s, i);
           changes++;
+          last = k;
         }
       }
     }
-    if (changes == 0 || (sweep >= 3 && changes >= last)) break;
-    last = changes;
+    if (changes == 0 || (sweep >= 3 && changes >= before)) break;
+    before = changes;
   }
   return changes;
 }
