@@ -15,6 +15,8 @@ from uasfly.control.qp import Active, QpOptions, QpSolution, SolveStatus, StageQ
 from uasfly.control.riccati import StageFunctions
 from uasfly.control.sweeps import RiccatiSweeps
 
+MANY = 0.25  # changes a stage; where more than so many do not become fewer, the guess is no good
+
 
 class RiccatiQp:
     """QpSolver for N stages; one instance is for one thread."""
@@ -56,7 +58,7 @@ class RiccatiQp:
         work, tolerance = self._sweeps, self._options.bound_tolerance
         inputs, gradient = work.inputs, work.gradient
         least, greatest = qp.lower - tolerance, qp.upper + tolerance
-        held, last, before, changes = active != 0, -1, 0, 1
+        held, last, before, changes = active != 0, -1, active.size + 1, 1
         for sweep in range(1, most + 1):
             work.free[:] = ~held
             work.fixed[:] = np.where(held, np.where(active < 0, qp.lower, qp.upper), 0.0)
@@ -66,7 +68,7 @@ class RiccatiQp:
             following = np.where(held, staying, entering).astype(np.int8)
             changed = np.flatnonzero(following != active)
             active, held, changes = following, following != 0, changed.size
-            if not changes or (sweep >= 3 and changes >= before):
+            if not changes or (changes >= before and changes > MANY * qp.nodes):
                 return active, changes, sweep
             before = changes
             last = int(changed[-1]) // active.shape[1]  # behind this stage the cost to go is what it was

@@ -1,5 +1,7 @@
 /* Primal-dual active set: guess which inputs are held at a bound, sweep, correct the guess until it stands. */
 
+#define MANY 0.25 /* changes a stage; where more than so many do not become fewer, the guess is no good */
+
 static void hold(stage_t *stage, int i) {
   signed char side = stage->active[i];
   stage->free[i] = side == 0;
@@ -26,7 +28,7 @@ static void active_set_sweep(const problem_t *problem, stage_t *stages, int last
 
 /* Returns how many inputs still changed sides in the last sweep: 0 when the set stands and the result is exact. */
 static int active_set(const problem_t *problem, stage_t *stages, int most, int *sweeps) {
-  int nodes = problem->nodes, changes = 1, before = 0, last = nodes - 1;
+  int nodes = problem->nodes, changes = 1, before = NU * nodes + 1, last = nodes - 1;
   double tolerance = problem->bound_tolerance;
   for (int k = 0; k < nodes; k++)
     for (int i = 0; i < NU; i++) hold(&stages[k], i);
@@ -53,7 +55,7 @@ static int active_set(const problem_t *problem, stage_t *stages, int most, int *
         }
       }
     }
-    if (changes == 0 || (sweep >= 3 && changes >= before)) break;
+    if (changes == 0 || (changes >= before && changes > MANY * nodes)) break;
     before = changes;
   }
   return changes;
