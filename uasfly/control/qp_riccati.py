@@ -62,7 +62,7 @@ class RiccatiQp:
         for sweep in range(1, most + 1):
             work.free[:] = ~held
             work.fixed[:] = np.where(held, np.where(active < 0, qp.lower, qp.upper), 0.0)
-            work.active_set(last)
+            work.active_set(held.any(axis=1).tolist(), last)
             entering = (inputs > greatest).view(np.int8) - (inputs < least).view(np.int8)
             staying = np.where(active * gradient > tolerance, 0, active)
             following = np.where(held, staying, entering).astype(np.int8)

@@ -21,7 +21,8 @@ class Stagewise:
         results: (N, n) each.
 
     Attributes:
-        calls: evaluate one stage each, in the order of the stages.
+        calls: evaluate one stage each, in the order of the stages; only while this object lives: they hold no
+            reference to it.
 
     Raises:
         ValueError: when an array does not fit, or its rows are not contiguous doubles.

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from uasfly.control.qp import StageQp
 from uasfly.control.riccati import FACTOR, PACKED, PACKED_INPUTS, StageFunctions
 from uasfly.control.stagewise import Stagewise
+from uasfly.messages import Array
 from uasfly.model import INPUTS, STATES
 
 _DIAGONAL = np.cumsum(np.arange(1, STATES + 1)) - 1  # places of P's diagonal in its packed triangle
@@ -19,7 +22,7 @@ class RiccatiSweeps:
         free, fixed: (N, 3) for `active_set`: 1 where an input is free, 0 where it is held at `fixed`, which is else 0.
         barrier_gradient, barrier_weights: (N, 3) for `predict` and `correct`: r and R with the barrier's share.
         states: (N + 1, 8) dx, inputs: (N, 3) du: results of the last sweep; for `rollout` the inputs are its argument.
-        gradient: (N, 3) of the cost by du, after `active_set`.
+        gradient: (N, 3) of the cost by du after `active_set`.
     """
 
     def __init__(self, stages: StageFunctions, packed_size: int, nodes: int) -> None:
@@ -43,28 +46,38 @@ class RiccatiSweeps:
 
         behind, here, before, after = [cost[1:], slope[1:]], [cost[:-1], slope[:-1]], self.states[:-1], self.states[1:]
         linear = [jacobian, defect]
-        self._backward = Stagewise(
+        held = Stagewise(
             stages.backward,
             [*behind, *linear, q[:-1], r, weight_x[:-1], weight_u, self.free, self.fixed],
             [*here, gain, feedforward, h_ux, h_uu, h_u],
         )
-        self._forward = Stagewise(
+        held_forward = Stagewise(
             stages.forward,
             [before, *linear, gain, feedforward, h_ux, h_uu, h_u, self.fixed],
             [after, self.inputs, self.gradient],
         )
-        self._barrier_backward = Stagewise(
-            stages.barrier_backward,
-            [*behind, *linear, q[:-1], self.barrier_gradient, weight_x[:-1], self.barrier_weights],
-            [*here, gain, feedforward, factor, cost_of_defect],
+
+        def barrier_backward(gradient: Array, weights: Array) -> Stagewise:
+            return Stagewise(
+                stages.barrier_backward,
+                [*behind, *linear, q[:-1], gradient, weight_x[:-1], weights],
+                [*here, gain, feedforward, factor, cost_of_defect],
+            )
+
+        free, self._barrier_backward = (
+            barrier_backward(r, weight_u),
+            barrier_backward(self.barrier_gradient, self.barrier_weights),
         )
+        self._barrier_forward = Stagewise(
+            stages.barrier_forward, [before, *linear, gain, feedforward], [after, self.inputs]
+        )
+        self._kept = (free, held, held_forward)  # their calls are nothing without them
+        self._backward_calls = tuple(zip(free.calls, held.calls, strict=True))
+        self._forward_calls = tuple(zip(self._barrier_forward.calls, held_forward.calls, strict=True))
         self._barrier_vector = Stagewise(
             stages.barrier_vector,
             [slope[1:], jacobian, cost_of_defect, q[:-1], self.barrier_gradient, gain, factor],
             [slope[:-1], feedforward],
-        )
-        self._barrier_forward = Stagewise(
-            stages.barrier_forward, [before, *linear, gain, feedforward], [after, self.inputs]
         )
         self._rollout = Stagewise(stages.rollout, [before, *linear, self.inputs], [after])
 
@@ -76,10 +89,19 @@ class RiccatiSweeps:
         self._cost[-1, _DIAGONAL], self._slope[-1] = qp.state_weights[-1], qp.state_gradient[-1]
         self.states[0] = qp.initial
 
-    def active_set(self, last: int = -1) -> None:
-        """Minimum with some inputs held; the cost to go behind stage `last` is taken as it stands."""
-        self._backward.backward(last)
-        self._forward.forward()
+    def active_set(self, held: Sequence[bool], last: int = -1) -> None:
+        """Minimum with some inputs held; the cost to go behind stage `last` is taken as it stands.
+
+        Args:
+            held: for each stage, whether any input is held there; the others are cheaper.
+            last: where the backward part starts.
+        """
+        last %= len(held)
+        for calls, any_held in zip(self._backward_calls[last::-1], held[last::-1], strict=True):
+            calls[any_held]()
+        self.gradient[:] = 0.0  # of what is free, at the minimum
+        for calls, any_held in zip(self._forward_calls, held, strict=True):
+            calls[any_held]()
 
     def predict(self) -> None:
         """Minimum with every input free, under the barrier's gradient and weights."""
