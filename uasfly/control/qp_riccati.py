@@ -8,6 +8,8 @@ make the result exact.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from uasfly.control.interior_point import InteriorPoint
@@ -49,7 +51,7 @@ class RiccatiQp:
                 # No set stands (a bound is active with no multiplier, say): the point inside is the result.
                 active, work.inputs[:] = interior.active(), interior.point
                 work.rollout()
-        if not np.isfinite(work.states.sum() + work.inputs.sum()):
+        if not math.isfinite(np.vdot(work.states, work.states) + np.vdot(work.inputs, work.inputs)):
             status = SolveStatus.FAILED
         return QpSolution(status, work.states.copy(), work.inputs.copy(), active, sweeps, iterations)
 
@@ -58,16 +60,18 @@ class RiccatiQp:
         work, tolerance = self._sweeps, self._options.bound_tolerance
         inputs, gradient = work.inputs, work.gradient
         least, greatest = qp.lower - tolerance, qp.upper + tolerance
-        held, last, before, changes = active != 0, -1, active.size + 1, 1
+        last, before, changes = -1, active.size + 1, 1
         for sweep in range(1, most + 1):
-            work.free[:] = ~held
-            work.fixed[:] = np.where(held, np.where(active < 0, qp.lower, qp.upper), 0.0)
-            work.active_set(held.any(axis=1).tolist(), last)
-            entering = (inputs > greatest).view(np.int8) - (inputs < least).view(np.int8)
-            staying = np.where(active * gradient > tolerance, 0, active)
-            following = np.where(held, staying, entering).astype(np.int8)
+            held = np.asarray(active.any(axis=1)).tolist()
+            if any(held):
+                at_bound = active != 0
+                work.free[:] = ~at_bound
+                work.fixed[:] = np.where(active < 0, qp.lower, qp.upper) * at_bound
+            work.active_set(held, last)
+            outside = (inputs > greatest).view(np.int8) - (inputs < least).view(np.int8)  # 0 for what is held
+            following = np.where(active * gradient > tolerance, 0, active) + outside
             changed = np.flatnonzero(following != active)
-            active, held, changes = following, following != 0, changed.size
+            active, changes = following, changed.size
             if not changes or (changes >= before and changes > MANY * qp.nodes):
                 return active, changes, sweep
             before = changes

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from uasfly.control.grid import Shift
@@ -13,7 +15,6 @@ from uasfly.control.riccati import stage_functions
 from uasfly.control.stagewise import Stagewise
 from uasfly.control.transcription import linearisation_function
 from uasfly.control.workspace import Workspace
-from uasfly.messages import Array
 from uasfly.model import INPUTS, STATES
 
 
@@ -30,6 +31,8 @@ class VirtualMachineBackend:
         self._problem, self._workspace = problem, workspace
         self._qp: QpSolver = qp or RiccatiQp(stage_functions(pattern), pattern.size, nodes, options)
         self._shift: tuple[float, Shift] = (0.0, Shift.after(problem.grid, 0.0))
+
+        self._lower, self._upper = (np.tile(bound, (nodes, 1)) for bound in (problem.input_lower, problem.input_upper))
 
         # Where the plan is linearised, and what comes of it.
         self._states, self._inputs = np.zeros((nodes + 1, STATES)), np.zeros((nodes, INPUTS))
@@ -64,7 +67,7 @@ class VirtualMachineBackend:
     def references(self) -> SolveStatus:
         """See `Backend.references`."""
         work = self._workspace
-        if not _all_finite(work.position, work.velocity, work.acceleration, work.yaw, work.force, work.parameters):
+        if not work.given_is_finite():
             return SolveStatus.BAD_INPUT
         self._force_at_nodes[:-1], self._force_at_nodes[-1] = work.force, work.force[-1]
         self._trim.forward()
@@ -76,8 +79,7 @@ class VirtualMachineBackend:
     def iterate(self, elapsed_s: float) -> SolveStatus:
         """See `Backend.iterate`."""
         work, states, inputs = self._workspace, self._states, self._inputs
-        data = (work.initial, work.yaw, work.parameters, work.force, work.state_reference, work.input_reference)
-        if not (np.isfinite(elapsed_s) and _all_finite(*data)):
+        if not (math.isfinite(elapsed_s) and work.given_is_finite() and work.references_are_finite()):
             return SolveStatus.BAD_INPUT
         if elapsed_s > 0.0:
             if elapsed_s != self._shift[0]:
@@ -96,7 +98,8 @@ class VirtualMachineBackend:
         if solution.status is SolveStatus.FAILED:
             return SolveStatus.FAILED
         np.add(states, solution.states, out=work.states)
-        np.clip(inputs + solution.inputs, self._problem.input_lower, self._problem.input_upper, out=work.inputs)
+        np.maximum(inputs + solution.inputs, self._lower, out=work.inputs)
+        np.minimum(work.inputs, self._upper, out=work.inputs)
         work.active[:] = solution.active
         return solution.status
 
@@ -112,10 +115,6 @@ class VirtualMachineBackend:
             input_gradient=problem.input_weights * (inputs - work.input_reference),
             state_weights=problem.state_weights,
             input_weights=problem.input_weights,
-            lower=problem.input_lower - inputs,
-            upper=problem.input_upper - inputs,
+            lower=self._lower - inputs,
+            upper=self._upper - inputs,
         )
-
-
-def _all_finite(*arrays: Array) -> bool:
-    return bool(np.isfinite(sum(float(array.sum()) for array in arrays)))
