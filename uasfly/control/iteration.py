@@ -75,6 +75,7 @@ class RealTimeIteration:
         self.workspace = Workspace(problem)
         self.backend, self.announcement = make_backend(problem, self.workspace, backend, options)
         self.plan_start_s: float | None = None
+        self._moves_weigh = problem.moves_weigh
 
     def solve(self, start_s: float, iterations: int = 1, before: Array | None = None) -> SolveStatus:
         """Plan from `start_s` on [s]; on a cold start at least three iterations.
@@ -89,8 +90,8 @@ class RealTimeIteration:
         status = self.backend.references()
         if status is not SolveStatus.CONVERGED:
             return status
-        first = self.workspace.input_reference[0]
-        if before is not None and self.problem.moves_weigh:
+        if before is not None and self._moves_weigh:
+            first = self.workspace.input_reference[0]
             first[:] = self.problem.first_input_reference(first, before)
         elapsed = -1.0
         if self.plan_start_s is not None and 0.0 <= start_s - self.plan_start_s <= LONGEST_SHIFT_S:

@@ -62,14 +62,16 @@ class RiccatiQp:
         least, greatest = qp.lower - tolerance, qp.upper + tolerance
         last, before, changes = -1, active.size + 1, 1
         for sweep in range(1, most + 1):
-            held = np.asarray(active.any(axis=1)).tolist()
-            if any(held):
+            held = np.logical_or.reduce(active, axis=1).tolist()
+            any_held = True in held
+            if any_held:
                 at_bound = active != 0
                 work.free[:] = ~at_bound
                 work.fixed[:] = np.where(active < 0, qp.lower, qp.upper) * at_bound
             work.active_set(held, last)
-            outside = (inputs > greatest).view(np.int8) - (inputs < least).view(np.int8)  # 0 for what is held
-            following = np.where(active * gradient > tolerance, 0, active) + outside
+            following = (inputs > greatest).view(np.int8) - (inputs < least).view(np.int8)  # 0 for what is held
+            if any_held:
+                following += np.where(active * gradient > tolerance, 0, active)
             changed = np.flatnonzero(following != active)
             active, changes = following, changed.size
             if not changes or (changes >= before and changes > MANY * qp.nodes):
