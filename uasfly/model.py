@@ -121,7 +121,7 @@ def controller_parameters(model: ModelParameters, force_in_world: Array, k_thrus
             model.pitch.tau_s,
             model.pitch.gain,
             *model.drag_1_s,
-            *force_in_world,
+            *force_in_world.tolist(),
             k_thrust_m_s2,
         )
     )

@@ -11,10 +11,11 @@ import pytest
 from tests.control.vehicle import f550
 from uasfly.airframe import Airframe
 from uasfly.control.compiled import CompiledBackend
-from uasfly.control.native_library import NativeUnavailableError, load_library
+from uasfly.control.native_library import load_solver
 from uasfly.control.problem import Problem
 from uasfly.control.virtual_machine import VirtualMachineBackend
 from uasfly.control.workspace import Backend, Workspace
+from uasfly.native import NativeUnavailableError
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -32,7 +33,7 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 def library(_own_cache: None) -> ctypes.PyDLL:
     """The compiled driver; skips where there is no C compiler."""
     try:
-        return load_library()
+        return load_solver()
     except NativeUnavailableError as reason:
         pytest.skip(f"no compiled solver: {reason}")
 

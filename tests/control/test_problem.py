@@ -58,7 +58,7 @@ def test_a_step_of_the_first_input_costs_what_the_problem_says() -> None:
     np.testing.assert_allclose(problem.move_weights, 1.5 * stage)
     np.testing.assert_allclose(problem.input_weights[1], stage)
     inputs, reference, before = np.array((0.4, 0.1, -0.2)), np.array((0.3, 0.0, 0.1)), np.array((0.5, -0.1, 0.3))
-    blended = problem.first_input_reference(reference, before)
+    blended = reference + problem.move_share * (before - reference)
     np.testing.assert_allclose(
         problem.input_weights[0] * (inputs - blended),
         stage * (inputs - reference) + 1.5 * stage * (inputs - before),

@@ -87,6 +87,11 @@ class ClockworkVehicle:
         """Full."""
         return BatterySample(self.time_s, 16.8, 1.0)
 
+    @property
+    def condition(self) -> tuple[FlightMode, bool, bool]:
+        """On the ground."""
+        return FlightMode.HOLD, False, False
+
     def state(self) -> VehicleSample:
         """On the ground."""
         return VehicleSample(self.time_s, FlightMode.HOLD, armed=False, in_air=False)

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uasfly.control.native_library import NativeUnavailableError, load_library
+from uasfly.control.native_library import load_solver
 from uasfly.control.problem import Problem
 from uasfly.control.qp import Active, QpOptions, QpSolution, SolveStatus, StageQp
 from uasfly.control.workspace import Workspace
+from uasfly.native import NativeUnavailableError
 
 _pointer, _int, _double = ctypes.c_void_p, ctypes.c_int, ctypes.c_double
 
@@ -75,7 +76,7 @@ class CompiledBackend:
         library: ctypes.PyDLL | None = None,
     ) -> None:
         options = options or QpOptions()
-        library = library or load_library()
+        library = library or load_solver()
         nodes = problem.grid.nodes
         library.uasfly_workspace_bytes.restype = ctypes.c_long
         library.uasfly_problem_bytes.restype = ctypes.c_long

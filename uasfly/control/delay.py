@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from functools import lru_cache
 
+import casadi as ca
 import numpy as np
 
+from uasfly import native
 from uasfly.airframe import GRAVITY_M_S2, ModelParameters
 from uasfly.control.buffered import BufferedFunction
 from uasfly.control.transcription import interval_function
@@ -14,6 +17,11 @@ from uasfly.messages import Array, Setpoint
 from uasfly.model import PARAMETER_K_THRUST, PITCH, ROLL, STATES
 
 LONGEST_PREDICTION_S = 0.5
+
+
+@lru_cache(maxsize=1)
+def _compiled_interval() -> ca.Function:
+    return native.compiled([interval_function()], "interval")[0]
 
 
 class DelayPredictor:
@@ -25,7 +33,7 @@ class DelayPredictor:
 
     def __init__(self, model: ModelParameters) -> None:
         self._model = model
-        self._interval = BufferedFunction(interval_function())
+        self._interval = BufferedFunction(_compiled_interval())
         # From when each setpoint acts [s]; the first one acts since ever, None where it is not known.
         self._history: deque[tuple[float, Setpoint | None]] = deque(((-math.inf, None),), maxlen=256)
 

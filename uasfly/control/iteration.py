@@ -10,12 +10,12 @@ import math
 from dataclasses import dataclass
 
 from uasfly.control.compiled import CompiledBackend
-from uasfly.control.native_library import NativeUnavailableError
 from uasfly.control.problem import Problem
 from uasfly.control.qp import QpOptions, SolveStatus
 from uasfly.control.virtual_machine import VirtualMachineBackend
 from uasfly.control.workspace import Backend, Workspace
 from uasfly.messages import Array
+from uasfly.native import NativeUnavailableError
 
 COLD_ITERATIONS = 3
 LONGEST_SHIFT_S = 0.5  # an older plan is no better a start than the references
@@ -75,7 +75,8 @@ class RealTimeIteration:
         self.workspace = Workspace(problem)
         self.backend, self.announcement = make_backend(problem, self.workspace, backend, options)
         self.plan_start_s: float | None = None
-        self._moves_weigh = problem.moves_weigh
+        self._first = self.workspace.input_reference[0]
+        self._move_share = problem.move_share
 
     def solve(self, start_s: float, iterations: int = 1, before: Array | None = None) -> SolveStatus:
         """Plan from `start_s` on [s]; on a cold start at least three iterations.
@@ -90,9 +91,8 @@ class RealTimeIteration:
         status = self.backend.references()
         if status is not SolveStatus.CONVERGED:
             return status
-        if before is not None and self._moves_weigh:
-            first = self.workspace.input_reference[0]
-            first[:] = self.problem.first_input_reference(first, before)
+        if before is not None:
+            self._first += self._move_share * (before - self._first)  # see `Problem.move_share`
         elapsed = -1.0
         if self.plan_start_s is not None and 0.0 <= start_s - self.plan_start_s <= LONGEST_SHIFT_S:
             elapsed = start_s - self.plan_start_s

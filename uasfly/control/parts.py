@@ -10,7 +10,7 @@ from uasfly.frames import euler_from_quaternion, wrap_angle
 from uasfly.messages import Array, Setpoint, StateEstimate
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Attitude:
     """Roll, pitch, yaw [rad] and the rate of yaw [rad/s] of an estimate."""
 
@@ -40,6 +40,7 @@ class SetpointGuard:
 
     def __init__(self, limits: Limits, hover_thrust: float) -> None:
         self._limits = limits
+        self._tilt_rad, self._yaw_rate_rad_s = limits.tilt_rad, limits.yaw_rate_rad_s
         self._hover_thrust = hover_thrust
         self._yaw_rad = 0.0
 
@@ -54,10 +55,10 @@ class SetpointGuard:
             self._yaw_rad = wrap_angle(yaw_rad)
         return Setpoint(
             time_s=time_s,
-            roll_rad=_bounded(roll, 0.0, -limits.tilt_rad, limits.tilt_rad),
-            pitch_rad=_bounded(pitch, 0.0, -limits.tilt_rad, limits.tilt_rad),
+            roll_rad=_bounded(roll, 0.0, -self._tilt_rad, self._tilt_rad),
+            pitch_rad=_bounded(pitch, 0.0, -self._tilt_rad, self._tilt_rad),
             yaw_rad=self._yaw_rad,
-            yaw_rate_rad_s=_bounded(yaw_rate_rad_s, 0.0, -limits.yaw_rate_rad_s, limits.yaw_rate_rad_s),
+            yaw_rate_rad_s=_bounded(yaw_rate_rad_s, 0.0, -self._yaw_rate_rad_s, self._yaw_rate_rad_s),
             thrust=_bounded(thrust, self._hover_thrust, limits.thrust_min, limits.thrust_max),
         )
 

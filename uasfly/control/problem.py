@@ -27,7 +27,7 @@ class Problem:
             last node the terminal weight on top.
         input_weights: (N, 3) diagonals of R_k: the stage weight times the length of the interval.
         input_lower, input_upper: (3,) bounds of thrust, roll_d, pitch_d.
-        move_weights: (3,) diagonal of M; R_0 holds it already, see `first_input_reference`.
+        move_weights: (3,) diagonal of M; R_0 holds it already, see `move_share`.
     """
 
     grid: Grid
@@ -38,15 +38,14 @@ class Problem:
     move_weights: Array = field(default_factory=lambda: np.zeros(3))
 
     @property
-    def moves_weigh(self) -> bool:
-        """Whether M is not zero."""
-        return bool(self.move_weights.any())
+    def move_share(self) -> Array:
+        """Share (3,) of M in R_0.
 
-    def first_input_reference(self, reference: Array, before: Array) -> Array:
-        """Reference (3,) for u_0 that, weighed with R_0, stands for the paper's term and for that of M."""
-        share = self.move_weights / self.input_weights[0]
-        blended: Array = (1.0 - share) * reference + share * before
-        return blended
+        A reference for u_0 that lies so far on the way to the inputs before stands, weighed with R_0, for the paper's
+        term and for that of M.
+        """
+        share: Array = self.move_weights / self.input_weights[0]
+        return share
 
     def __post_init__(self) -> None:
         if not np.all(self.input_lower < self.input_upper):

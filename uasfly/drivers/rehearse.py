@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,8 @@ def rehearse(plan: FlightPlan, log: Path | None = None, watch: Watch | None = No
     writer = LogWriter(log, plan.description()) if log is not None else None
     period_s = 1.0 / plan.airframe.controller.rate_hz
     started = time.perf_counter()
+    gc.collect()
+    gc.freeze()  # what lives now lives to the end: looking through it again and again costs time
     cycle = 0
     try:
         while not pilot.done and cycle * period_s < LONGEST_FLIGHT_S:
@@ -75,6 +78,7 @@ def rehearse(plan: FlightPlan, log: Path | None = None, watch: Watch | None = No
             if watch is not None:
                 watch(result.status, Cycle(result.setpoint is not None, cycle_ms, solve_ms))
     finally:
+        gc.unfreeze()
         if writer is not None:
             writer.close()
             if writer.problem:

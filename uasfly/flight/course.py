@@ -135,6 +135,16 @@ class Course:
         assert self._hold is not None
         return self._hold.sample(times_s)
 
+    def place_at(self, time_s: float) -> Array:
+        """Where the reference is at one time: (3,) m, world."""
+        if self._trajectory is None:
+            assert self._hold is not None
+            return self._hold.position_in_world
+        place = self._trajectory.position_at(self._mission_s(time_s))
+        if self._glide is None:
+            return np.array(place)
+        return np.array([p + offset for p, offset in zip(place, self._glide.offset_at(time_s), strict=True)])
+
     def pace(self, time_s: float) -> float:
         """Rate of the mission's time."""
         return self._pacing.pace(time_s) if self._trajectory is not None else 0.0

@@ -104,6 +104,7 @@ class Pilot:
         self._streamed = False
         self._control: ControlResult | None = None
         self._time_s: float | None = None
+        self._reference: Array | None = None  # (3,) m, world: where the vehicle should be in this step
 
     @property
     def done(self) -> bool:
@@ -146,6 +147,7 @@ class Pilot:
         requests = sequencer.step(time_s, self.view, estimate, self.course.done(time_s))
         checks = self._check_before_flight(time_s, samples, estimate)
         setpoint, control, authority = None, None, None
+        self._reference = None
         alarms: tuple[Alarm, ...] = ()
         if estimate is not None:
             self._follow_phase(time_s, estimate)
@@ -234,7 +236,7 @@ class Pilot:
         origin = self.course.origin
         flying = self._phase is Phase.LEGS and self.sequencer.streaming and origin is not None
         place = np.zeros(3) if origin is None else origin
-        reference = self.reference_at(np.array([time_s])).position_in_world[0] if flying else None
+        self._reference = self.course.place_at(time_s) if flying else None
         return self.monitors.check(
             Watched(
                 time_s=time_s,
@@ -244,7 +246,7 @@ class Pilot:
                 view=self.view,
                 origin=place,
                 home=self._home(place),
-                reference=reference,
+                reference=self._reference,
                 control=self._control,
                 authority=authority,
             )
@@ -324,7 +326,7 @@ class Pilot:
         if course.begun and sequencer.phase in (Phase.LEGS, Phase.ENGAGE):
             progress = course.progress(time_s)
         if in_legs and course.begun:
-            reference = self.reference_at(np.array([time_s])).position_in_world[0]
+            reference = course.place_at(time_s) if self._reference is None else self._reference
         elif sequencer.phase in (Phase.ENDING, Phase.DONE):
             progress = 1.0
         announcements = tuple(sequencer.announcements)

@@ -30,22 +30,32 @@ class _SquareSum:
     """Running RMS per axis and largest norm."""
 
     count: int = 0
-    squares: Array = field(default_factory=lambda: np.zeros(3))
-    largest: float = 0.0
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    largest_square: float = 0.0
 
     def add(self, error: Array) -> None:
+        x, y, z = error.tolist()
+        x, y, z = x * x, y * y, z * z
         self.count += 1
-        self.squares += error * error
-        self.largest = max(self.largest, math.sqrt(float(error @ error)))
+        self.x += x
+        self.y += y
+        self.z += z
+        self.largest_square = max(self.largest_square, x + y + z)
+
+    @property
+    def largest(self) -> float:
+        return math.sqrt(self.largest_square)
 
     def rms(self) -> dict[str, float] | None:
         if self.count == 0:
             return None
-        x, y, z = np.sqrt(self.squares / self.count).tolist()
-        return {"x": x, "y": y, "z": z, "total": math.sqrt(float(self.squares.sum()) / self.count)}
+        squares = {"x": self.x, "y": self.y, "z": self.z, "total": self.x + self.y + self.z}
+        return {name: math.sqrt(square / self.count) for name, square in squares.items()}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Cycle:
     time_s: float
     estimate: Array

@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -83,6 +84,11 @@ class DirectVehicle(Protocol):
     @property
     def boots(self) -> int:
         """How often it has started."""
+        ...
+
+    @property
+    def condition(self) -> tuple[FlightMode, bool, bool]:
+        """Mode, whether it is armed, whether it is in the air."""
         ...
 
     @property
@@ -165,8 +171,7 @@ class InProcessLink:
         self._now_s = vehicle.time_s
         self._ahead_s = 0.0  # host time minus vehicle time: the vehicle's clock may jump, and starts anew with it
         self._boots = vehicle.boots
-        state = vehicle.state()
-        self._said = (state.mode, state.armed, state.in_air)  # last told
+        self._said = vehicle.condition  # last told
         self._ticks = [
             _Tick(1.0 / ODOMETRY_RATE_HZ, vehicle.odometry),
             _Tick(1.0 / ATTITUDE_TARGET_RATE_HZ, vehicle.attitude_target),
@@ -187,7 +192,7 @@ class InProcessLink:
                 self._deliver(heapq.heappop(self._commands)[2])
             else:
                 self._arrive(next_tick.read())
-                next_tick.count += 1
+                next_tick.go_on()
             self._tell_changes()
             for text in self._vehicle.take_texts():
                 self._arrive(text)
@@ -234,14 +239,12 @@ class InProcessLink:
             self._arrive(LinkSample(vehicle.time_s, LinkEvent.REBOOTED))
 
     def _state(self) -> VehicleSample:
-        state = self._vehicle.state()
-        self._said = (state.mode, state.armed, state.in_air)
-        return state
+        self._said = self._vehicle.condition
+        return self._vehicle.state()
 
     def _tell_changes(self) -> None:
         """PX4 tells a new mode at once."""
-        state = self._vehicle.state()
-        if (state.mode, state.armed, state.in_air) != self._said:
+        if self._vehicle.condition != self._said:
             self._arrive(self._state())
 
     def _command_latency(self) -> float:
@@ -285,21 +288,21 @@ class InProcessLink:
 class _Tick:
     """A stream with a fixed rate: when it is due next, and how to read it."""
 
-    __slots__ = ("count", "period_s", "read")
+    __slots__ = ("count", "due_s", "period_s", "read")
 
     def __init__(self, period_s: float, read: _Reader) -> None:
         self.period_s = period_s
         self.read = read
         self.count = 1
+        self.due_s = period_s
 
-    @property
-    def due_s(self) -> float:
-        return self.count * self.period_s
+    def go_on(self) -> None:
+        self.count += 1
+        self.due_s = self.count * self.period_s
 
 
 class _Reader(Protocol):
     def __call__(self) -> Sample: ...
 
 
-def _due(tick: _Tick) -> float:
-    return tick.due_s
+_due = attrgetter("due_s")

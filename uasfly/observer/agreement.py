@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from itertools import repeat
 
 from uasfly.observer.door import Odometry
 
@@ -32,7 +33,8 @@ class Agreement:
     def __init__(self) -> None:
         self.apart_m = 0.0
         self.agrees = True
-        self._past: deque[tuple[float, Vector]] = deque()
+        self._past_s: deque[float] = deque()
+        self._past: deque[Vector] = deque()
         self._time_s = -math.inf
         self._way: Vector = (0.0, 0.0, 0.0)
 
@@ -46,21 +48,24 @@ class Agreement:
         _, has_position, has_velocity = odometry.use
         elapsed = odometry.time_s - self._time_s
         self._time_s = odometry.time_s
-        past = self._past
+        past, past_s = self._past, self._past_s
         if not (0.0 <= elapsed < LONGEST_ELAPSED_S and has_velocity):
             past.clear()
+            past_s.clear()
             elapsed = 0.0
         vx, vy, vz = odometry.velocity
         wx, wy, wz = self._way
         self._way = wx, wy, wz = wx + vx * elapsed, wy + vy * elapsed, wz + vz * elapsed
-        while past and past[0][0] < odometry.time_s - WINDOW_S:
+        while past_s and past_s[0] < odometry.time_s - WINDOW_S:
+            past_s.popleft()
             past.popleft()
         if has_position and has_velocity:
             x, y, z = odometry.position
             now = (x - wx, y - wy, z - wz)
-            if not past or odometry.time_s >= past[-1][0] + SPACING_S:
-                past.append((odometry.time_s, now))
-            self.apart_m = max(math.dist(now, then) for _, then in past)
+            if not past_s or odometry.time_s >= past_s[-1] + SPACING_S:
+                past_s.append(odometry.time_s)
+                past.append(now)
+            self.apart_m = max(map(math.dist, past, repeat(now)))
         elif not past:
             self.apart_m = 0.0
         self.agrees = self.apart_m <= APART_M + NOISE_SIGMAS * position_sigma_m

@@ -13,7 +13,7 @@ from uasfly.observer import states as s
 from uasfly.observer.moment import Moment, Verdict
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Diagnosis:
     """The filter at one time.
 
@@ -115,13 +115,13 @@ class Journal:
         biases = self._biases
         while len(biases) > 1 and biases[1][0] < time_s - JUMP_WINDOW_S:
             biases.popleft()
-        layout = moment.layout
-        P = moment.packed[layout.covariance].reshape(layout.errors, layout.errors)
-        positions = P[s.D_POSITION, s.D_POSITION].diagonal()
-        together = positions + P[s.D_BIAS, s.D_BIAS].diagonal() + 2.0 * P[s.D_POSITION, s.D_BIAS].diagonal()
+        variances, position_with_bias = moment.variances
+        position_sigmas = []
+        for position, bias, both in zip(variances[s.D_POSITION], variances[s.D_BIAS], position_with_bias, strict=True):
+            position_sigmas.append(math.sqrt(min(position, max(position + bias + 2.0 * both, 0.0))))
         return Diagnosis(
-            position_sigma_m=np.sqrt(np.minimum(positions, np.maximum(together, 0.0))),
-            velocity_sigma_m_s=np.sqrt(P[s.D_VELOCITY, s.D_VELOCITY].diagonal()),
+            position_sigma_m=np.array(position_sigmas),
+            velocity_sigma_m_s=np.array([math.sqrt(variance) for variance in variances[s.D_VELOCITY]]),
             rejected_share={k: t.rejected / len(t.entries) if t.entries else 0.0 for k, t in self._tallies.items()},
             nis_mean={k: t.nis / len(t.entries) if t.entries else math.nan for k, t in self._tallies.items()},
             jump_m=self._jump[0],

@@ -12,6 +12,7 @@ from typing import Any
 
 import casadi as ca
 
+from uasfly import native
 from uasfly.messages import Array
 from uasfly.observer import error_state as es
 from uasfly.observer import measurements as me
@@ -36,13 +37,19 @@ class Caller:
         buffer, evaluate = function.buffer()
         self._buffer: Any = buffer
         self._evaluate: Callable[[], None] = evaluate
+        self._arguments: list[Array | None] = [None] * function.n_in()
+        self._results: list[Array | None] = [None] * function.n_out()
 
     def __call__(self, arguments: tuple[Array, ...], results: tuple[Array, ...]) -> None:
         """Evaluate; arrays are contiguous, float64, at least as long as the function's; matrices are column-major."""
         for index, argument in enumerate(arguments):
-            self._buffer.set_arg(index, argument.data)
+            if argument is not self._arguments[index]:  # most are the same array in every call
+                self._buffer.set_arg(index, argument.data)
+                self._arguments[index] = argument
         for index, result in enumerate(results):
-            self._buffer.set_res(index, result.data)
+            if result is not self._results[index]:
+                self._buffer.set_res(index, result.data)
+                self._results[index] = result
         self._evaluate()
 
 
@@ -216,6 +223,19 @@ def injection(markers: int) -> ca.Function:
     nominal, error = ca.SX.sym("nominal", layout.nominal_size), ca.SX.sym("error", layout.errors)
     covariance = ca.SX.sym("covariance", layout.errors, layout.errors)
     return _function(f"injection_{markers}", [nominal, covariance, error], [*_inject(nominal, covariance, error)])
+
+
+@lru_cache(maxsize=8)
+def compiled_steps(markers: int) -> tuple[ca.Function, ca.Function]:
+    """`prediction` and `odometry_step`, compiled where that can be had (some seconds, once a computer)."""
+    step, odometry = native.compiled([prediction(markers), odometry_step(markers)], f"observer{markers}")
+    return step, odometry
+
+
+@lru_cache(maxsize=1)
+def compiled_extrapolation() -> ca.Function:
+    """`extrapolation`, compiled where that can be had."""
+    return native.compiled([extrapolation()], "extrapolation")[0]
 
 
 @lru_cache(maxsize=1)

@@ -44,6 +44,14 @@ class Moment:
         return s.Layout(len(self.markers))
 
     @property
+    def variances(self) -> tuple[list[float], list[float]]:
+        """Diagonal (n,) of the covariance, and the covariances (3,) of position and GNSS bias, axis by axis."""
+        first, n = self.layout.covariance.start, self.layout.errors
+        diagonal: list[float] = self.packed[first : first + n * n : n + 1].tolist()
+        start = first + s.D_BIAS.start * n + s.D_POSITION.start
+        return diagonal, self.packed[start : start + 2 * n + 3 : n + 1].tolist()
+
+    @property
     def position_sigma_m(self) -> float:
         """Standard deviation of the measured position's noise, as matched; mean of the axes."""
         start = self.layout.matched.start + 9 * s.POSITION_SENSOR
@@ -51,7 +59,7 @@ class Moment:
         return math.sqrt(max(0.0, total) / 3.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Verdict:
     """What the gate said of one sensor: normalised innovation squared, degrees of freedom, accepted or not."""
 

@@ -67,7 +67,7 @@ class Observer:
 
     Args:
         airframe: model and noise.
-        prepared_markers: for how many markers the functions are generated at once; more are generated in flight when
+        prepared_markers: for how many markers the functions are compiled at once; more are generated in flight when
             seen, which takes some tenths of a second each.
     """
 
@@ -77,7 +77,7 @@ class Observer:
         self._thrust = hover_thrust_history(airframe)
         self._stepper = Stepper(airframe, self._thrust)
         for markers in range(1, prepared_markers + 1):
-            self._stepper.prepare(markers)
+            self._stepper.prepare(markers, in_flight=False)
         self._k_thrust_m_s2 = airframe.model.k_thrust_m_s2
         self._timeline: Timeline | None = None
         self._journal = Journal()

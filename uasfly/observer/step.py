@@ -63,15 +63,22 @@ class Stepper:
         self._outputs = np.empty(s.ODOMETRY_OUTPUTS)
         self._predictions: dict[int, functions.Caller] = {}
         self._odometry_steps: dict[int, functions.Caller] = {}
-        self._extrapolation = functions.Caller(functions.extrapolation())
+        self._extrapolation = functions.Caller(functions.compiled_extrapolation())
         self._marker_algebra = MarkerAlgebra()
-        self.prepare(0)
+        self.prepare(0, in_flight=False)
 
-    def prepare(self, markers: int) -> None:
-        """Have the functions for `markers` markers ready (takes some tenths of a second the first time)."""
+    def prepare(self, markers: int, in_flight: bool) -> None:
+        """Have the functions for `markers` markers ready.
+
+        Args:
+            markers: how many.
+            in_flight: takes some tenths of a second; otherwise they are compiled, which may take some seconds.
+        """
         if markers not in self._predictions:
-            self._predictions[markers] = functions.Caller(functions.prediction(markers))
-            self._odometry_steps[markers] = functions.Caller(functions.odometry_step(markers))
+            generated = functions.prediction(markers), functions.odometry_step(markers)
+            predict, update = generated if in_flight else functions.compiled_steps(markers)
+            self._predictions[markers] = functions.Caller(predict)
+            self._odometry_steps[markers] = functions.Caller(update)
 
     def start(self, odometry: Odometry, airborne: bool) -> Moment:
         """The first moment, from a complete odometry sample: force and GNSS bias zero.
@@ -197,7 +204,7 @@ class Stepper:
         """The moment after the sighting; `moment` is already predicted to its time."""
         count = len(moment.markers)
         if sighting.marker_id not in moment.markers:
-            self.prepare(count + 1)
+            self.prepare(count + 1, in_flight=True)
             grown = replace(
                 moment,
                 packed=self._marker_algebra.first_sight(moment.packed, count, sighting),

@@ -62,7 +62,7 @@ def body_derivative(
         inertia_kg_m2: principal moments about the body axes.
     """
     rate = state[ANGULAR_RATE]
-    inertia = ca.DM(inertia_kg_m2)
+    inertia = ca.vertcat(*inertia_kg_m2)
     acceleration = force_in_world / mass_kg - ca.DM((0.0, 0.0, GRAVITY_M_S2))
     spin = 0.5 * quaternion_product(state[ATTITUDE], ca.vertcat(0.0, rate))
     return ca.vertcat(state[VELOCITY], acceleration, spin, (torque_in_body - ca.cross(rate, inertia * rate)) / inertia)

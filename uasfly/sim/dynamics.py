@@ -1,4 +1,4 @@
-"""The whole plant: derivative of its state and one step of the classical Runge-Kutta method, compiled once a plant.
+"""The whole plant: derivative of its state and one step of the classical Runge-Kutta method, compiled once a build.
 
 Runge-Kutta of fourth order at 250 Hz: the fastest motions are the rotor lag (30 rad/s), the landing gear (40-60 rad/s)
 and the closed rate loop (about 20 rad/s), so a step of 4 ms turns the fastest of them by a quarter of a radian. In a
@@ -15,6 +15,7 @@ from functools import lru_cache
 
 import casadi as ca
 
+from uasfly import native
 from uasfly.sim.aerodynamics import body_drag_force, body_drag_torque
 from uasfly.sim.body import (
     ANGULAR_RATE,
@@ -27,6 +28,7 @@ from uasfly.sim.body import (
     rotation_body_to_world,
 )
 from uasfly.sim.compiled import BoundFunction
+from uasfly.sim.figures import Build, plant_figures, symbolic_plant
 from uasfly.sim.ground import ANCHORS, feet_on_ground, ground_contact, reach_m
 from uasfly.sim.plant import Plant
 from uasfly.sim.rotors import rotor_wrench
@@ -95,12 +97,13 @@ class PlantDynamics:
         self._next_anchors = array("d", self.anchors)
         self._reach_m = reach_m(plant)
         self._grounded = False
-        functions = _compile(plant.model_dump_json(exclude={"parameters"}), step_s)
-        inputs = (self.state, self.targets, self.effectiveness, self.wind)
+        functions = _functions(Build.of(plant, step_s))
+        figures = plant_figures(plant)
+        inputs = (figures, self.state, self.targets, self.effectiveness, self.wind)
         outputs = (self._next_state, self.acceleration)
         self._fly = BoundFunction(functions["fly"], inputs, outputs)
         self._touch = BoundFunction(functions["touch"], (*inputs, self.anchors), (*outputs, self._next_anchors))
-        self._stand = BoundFunction(functions["stand"], (self.state,), (self.anchors,))
+        self._stand = BoundFunction(functions["stand"], (figures, self.state), (self.anchors,))
         self._blow = BoundFunction(functions["blow"], inputs, (self.force,))
         self.place((0.0, 0.0, 0.0), 1.0, 0.0)
 
@@ -131,16 +134,16 @@ class PlantDynamics:
 
 
 @lru_cache(maxsize=8)
-def _compile(plant_json: str, step_s: float) -> dict[str, ca.Function]:
-    """The plant's functions; kept, because building them takes longer than many a test flies."""
-    plant = Plant.model_validate_json(plant_json)
+def _functions(build: Build) -> dict[str, ca.Function]:
+    """The functions of a build, compiled where that can be had; their first argument are the plant's figures."""
+    (plant, figures), step_s = symbolic_plant(build.plant), build.step_s
     count = plant.rotors.count
     state = ca.SX.sym("state", BODY_STATES + count)
     targets = ca.SX.sym("targets", count)
     effectiveness = ca.SX.sym("effectiveness", count)
     wind = ca.SX.sym("wind", WIND)
     anchors = ca.SX.sym("anchors", ANCHORS)
-    inputs = [state, targets, effectiveness, wind]
+    inputs = [figures, state, targets, effectiveness, wind]
 
     def airborne(x: ca.SX) -> ca.SX:
         return plant_derivative(plant, x, targets, effectiveness, wind, None)
@@ -152,9 +155,10 @@ def _compile(plant_json: str, step_s: float) -> dict[str, ca.Function]:
     touched, touched_slope = runge_kutta_step(grounded, state, step_s)
     still = plant_derivative(plant, state, targets, effectiveness, ca.SX.zeros(WIND), None)
     next_anchors = ground_contact(plant, touched, anchors).anchors
-    return {
-        "fly": ca.Function("fly", inputs, ca.cse([flown, slope[VELOCITY]])),
-        "touch": ca.Function("touch", [*inputs, anchors], ca.cse([touched, touched_slope[VELOCITY], next_anchors])),
-        "stand": ca.Function("stand", [state], [feet_on_ground(plant, state)]),
-        "blow": ca.Function("blow", inputs, ca.cse([slope[VELOCITY] - still[VELOCITY]])),
-    }
+    functions = (
+        ca.Function("fly", inputs, ca.cse([flown, slope[VELOCITY]])),
+        ca.Function("touch", [*inputs, anchors], ca.cse([touched, touched_slope[VELOCITY], next_anchors])),
+        ca.Function("stand", [figures, state], [feet_on_ground(plant, state)]),
+        ca.Function("blow", inputs, ca.cse([slope[VELOCITY] - still[VELOCITY]])),
+    )
+    return {function.name(): function for function in native.compiled(functions, f"plant_{build.layout}")}

@@ -136,15 +136,13 @@ class Estimate:
         """The estimate as ODOMETRY gives it, with the white noise of a single sample."""
         self.refresh()
         state = self._state
-        attitude = (
-            (state[6], state[7], state[8], state[9])
-            if self._past is None
-            else self._before(self._sensors.delays.attitude_s).attitude
-        )
+        attitude = state[6:10] if self._past is None else self._before(self._sensors.delays.attitude_s).attitude
         white = self._sensors.attitude_noise_rad
-        error = np.array([e + white * n for e, n in zip(self.attitude_error, self._noise.row[_ATTITUDE], strict=True)])
+        (ea, eb, ec), (na, nb, nc) = self.attitude_error, self._noise.row[_ATTITUDE]
+        error = np.array((ea + white * na, eb + white * nb, ec + white * nc))
         quaternion = quaternion_product(np.array(attitude), quaternion_from_rotation_vector(error))
-        rate = np.array([state[10 + axis] + self.gyro_error[axis] for axis in range(3)])
+        (ra, rb, rc), (ga, gb, gc) = state[10:13], self.gyro_error
+        rate = np.array((ra + ga, rb + gb, rc + gc))
         return OdometrySample(
             time_s, np.array(self.position), np.array(self.velocity), quaternion, rate, self.reset_counter
         )

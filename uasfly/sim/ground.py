@@ -55,7 +55,7 @@ def reach_m(plant: Plant) -> float:
 def feet_on_ground(plant: Plant, state: ca.SX) -> ca.SX:
     """Anchors (8,) straight under the feet [m]: where they stand at first touch."""
     rotation = rotation_body_to_world(state[ATTITUDE])
-    return ca.vertcat(*((state[POSITION] + rotation @ ca.DM(foot))[:2] for foot in feet_in_body(plant)))
+    return ca.vertcat(*((state[POSITION] + rotation @ ca.vertcat(*foot))[:2] for foot in feet_in_body(plant)))
 
 
 def ground_contact(plant: Plant, state: ca.SX, anchors: ca.SX) -> GroundContact:
@@ -71,9 +71,9 @@ def ground_contact(plant: Plant, state: ca.SX, anchors: ca.SX) -> GroundContact:
     rotation = rotation_body_to_world(state[ATTITUDE])
     force_sum, torque_sum, new_anchors = ca.SX.zeros(3), ca.SX.zeros(3), []
     for index, foot in enumerate(feet_in_body(plant)):
-        arm = rotation @ ca.DM(foot)
+        arm = rotation @ ca.vertcat(*foot)
         position = state[POSITION] + arm
-        velocity = state[VELOCITY] + rotation @ ca.cross(state[ANGULAR_RATE], ca.DM(foot))
+        velocity = state[VELOCITY] + rotation @ ca.cross(state[ANGULAR_RATE], ca.vertcat(*foot))
         depth = ground_height_m(plant) - position[2]
         press = ca.fmax(0.0, stiffness * depth - damping * velocity[2]) * (depth > 0.0)
         stretch = anchors[2 * index : 2 * index + 2] - position[:2]
@@ -82,7 +82,7 @@ def ground_contact(plant: Plant, state: ca.SX, anchors: ca.SX) -> GroundContact:
         hold = ca.fmin(1.0, plant.gear.friction * press / pull_size)
         force = ca.vertcat(hold * pull, press)
         force_sum += force
-        torque_sum += ca.cross(ca.DM(foot), rotation.T @ force)
+        torque_sum += ca.cross(ca.vertcat(*foot), rotation.T @ force)
         # The anchor of a slipping foot keeps the spring at the friction limit, one of a lifted foot follows it freely.
         new_anchors.append(position[:2] + hold * stretch * (depth > 0.0))
     return GroundContact(force_sum, torque_sum, ca.vertcat(*new_anchors))

@@ -1,4 +1,4 @@
-"""The autopilot's fast loop: estimated attitude and gyro to rotor speed targets, compiled once a vehicle.
+"""The autopilot's fast loop: estimated attitude and gyro to rotor speed targets, compiled once a build.
 
 One call is what PX4 does on every gyro sample: reference model, attitude feedback, rate PID, mixer and thrust curve.
 It is symbolic (CasADi) for speed alone: 250 calls for each simulated second would cost more in Python than the plant.
@@ -12,10 +12,11 @@ from functools import lru_cache
 
 import casadi as ca
 
+from uasfly import native
 from uasfly.sim.attitude_control import follow_reference_model, rate_setpoint
 from uasfly.sim.body import ANGULAR_RATE, ATTITUDE, BODY_STATES, normalised, quaternion_product
 from uasfly.sim.compiled import BoundFunction
-from uasfly.sim.mixer import YAW, mix_commands, mixing_matrix
+from uasfly.sim.mixer import THRUST, YAW, mix_commands, mixing_matrix
 from uasfly.sim.parameters import ParameterTable
 from uasfly.sim.plant import Rotors
 from uasfly.sim.rate_control import (
@@ -84,8 +85,10 @@ class InnerLoop:
         self._parameters = parameters
         self._step_s = step_s
         self.read_parameters()
-        inputs = (plant_state, self.memory, self.inputs, self._gains)
-        self._function = BoundFunction(_compile(rotors, step_s), inputs, (self._next_memory, targets))
+        matrix = array("d", mixing_matrix(rotors).ravel(order="F").tolist())
+        inputs = (plant_state, self.memory, self.inputs, self._gains, matrix)
+        function = _function(rotors.count, rotors.speed_exponent, step_s)
+        self._function = BoundFunction(function, inputs, (self._next_memory, targets))
         self.reset((1.0, 0.0, 0.0, 0.0))
 
     def step(self) -> None:
@@ -123,8 +126,10 @@ class InnerLoop:
 
 
 @lru_cache(maxsize=8)
-def _compile(rotors: Rotors, step_s: float) -> ca.Function:
-    plant = ca.SX.sym("plant", BODY_STATES + rotors.count)
+def _function(count: int, speed_exponent: int, step_s: float) -> ca.Function:
+    """The loop for `count` rotors, compiled where that can be had."""
+    plant = ca.SX.sym("plant", BODY_STATES + count)
+    matrix = ca.SX.sym("matrix", count, THRUST + 1)
     memory = ca.SX.sym("memory", MEMORY)
     inputs = ca.SX.sym("inputs", INPUTS)
     gains = ca.SX.sym("gains", _GAINS)
@@ -151,13 +156,13 @@ def _compile(rotors: Rotors, step_s: float) -> ca.Function:
     armed = inputs[ARMED]
     integral = armed * next_integral(error, memory[INTEGRAL], memory[SATURATION], pid, inputs[FLYING], step_s)
 
-    mix = mix_commands(mixing_matrix(rotors), torque, ca.fmax(0.0, ca.fmin(1.0, inputs[SETPOINT_THRUST])))
+    mix = mix_commands(matrix, torque, ca.fmax(0.0, ca.fmin(1.0, inputs[SETPOINT_THRUST])))
     # The speed controllers take speed, the mixer gives thrust: PX4's THR_MDL_FAC of 1.
-    curve = ca.sqrt(mix.motors) if rotors.speed_exponent == 2 else mix.motors
+    curve = ca.sqrt(mix.motors) if speed_exponent == 2 else mix.motors
     saturation = ca.sign(torque) * (mix.kept < 1.0)
-    return ca.Function(
+    function = ca.Function(
         "inner_loop",
-        [plant, memory, inputs, gains],
+        [plant, memory, inputs, gains, matrix],
         ca.cse(
             [
                 ca.vertcat(
@@ -167,3 +172,4 @@ def _compile(rotors: Rotors, step_s: float) -> ca.Function:
             ]
         ),
     )
+    return native.compiled([function], f"inner_loop{count}")[0]

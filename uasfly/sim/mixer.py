@@ -38,10 +38,11 @@ def mixing_matrix(rotors: Rotors) -> Array:
     return np.asarray(mix)
 
 
-def mix_commands(matrix: Array, torque: ca.SX, thrust: ca.SX) -> Mix:
-    """Motor commands for normalised torques (3,) and a normalised thrust 0..1."""
-    tilt = ca.DM(matrix[:, :2]) @ torque[:2]
-    yaw = ca.DM(matrix[:, YAW]) * torque[YAW]
+def mix_commands(matrix: ca.SX, torque: ca.SX, thrust: ca.SX) -> Mix:
+    """Motor commands for normalised torques (3,) and a normalised thrust 0..1, by a `mixing_matrix` (n, 4)."""
+    matrix = ca.SX(matrix)
+    tilt = matrix[:, :2] @ torque[:2]
+    yaw = matrix[:, YAW] * torque[YAW]
     highest, lowest = ca.mmax(tilt), ca.mmin(tilt)
     tilt_kept = ca.fmin(1.0, 1.0 / ca.fmax(highest - lowest, 1e-9))
     lift = ca.fmax(0.0, ca.fmin(thrust, 1.0 - tilt_kept * highest))

@@ -65,13 +65,13 @@ def rotor_wrench(
         air_in_body: (3,) velocity of the air relative to the vehicle [m/s], without jets.
         rate: (3,) angular rate in the body [rad/s].
     """
-    xs = ca.DM([x for x, _ in rotors.positions_m])
-    ys = ca.DM([y for _, y in rotors.positions_m])
+    xs = ca.vertcat(*(x for x, _ in rotors.positions_m))
+    ys = ca.vertcat(*(y for _, y in rotors.positions_m))
     spins = ca.DM(rotors.spins)
     power = speeds * speeds if rotors.speed_exponent == 2 else speeds
     thrusts = rotors.thrust_coefficient * effectiveness * power
     acceleration = (targets - speeds) / rotors.lag_s
-    if rotors.inflow_slope > 0.0:
+    if rotors.thrust_law == "quadratic":
         mean_thrust = rotors.thrust_coefficient * ca.sum1(power) / rotors.count
         floor = _SMALLEST_HOVER_INFLOW_M_S**2
         hover_inflow = ca.sqrt(mean_thrust / (2.0 * AIR_DENSITY_KG_M3 * rotors.disc_area_m2) + floor)

@@ -78,6 +78,7 @@ class SimulatedVehicle:
         self._dynamics.place(start_position, math.cos(0.5 * start_yaw_rad), math.sin(0.5 * start_yaw_rad))
         check_motors(scenario.faults, len(self._dynamics.targets))
         self._state = self._dynamics.state
+        self._state_view, self._wind_view = np.frombuffer(self._state), np.frombuffer(self._dynamics.wind)
         self._wind = WindField(scenario.wind, np.random.default_rng(wind_seed), STEP_S)
         self._battery = Battery(plant)
         self._plant = plant
@@ -251,14 +252,14 @@ class SimulatedVehicle:
 
     def truth(self) -> TruthSample:
         """The true state, and what the wind does."""
-        state, wind = self._state, self._dynamics.wind
+        state, wind = self._state_view, self._wind_view
         return TruthSample(
             self.time_s,
-            np.array(state[0:3]),
-            np.array(state[3:6]),
-            np.array(state[6:10]),
+            state[0:3].copy(),
+            state[3:6].copy(),
+            state[6:10].copy(),
             np.array(self._dynamics.wind_force()),
-            np.array(wind[0:3]) + np.array(wind[3:6]),
+            wind[0:3] + wind[3:6],
         )
 
     def battery(self) -> BatterySample:
@@ -267,8 +268,13 @@ class SimulatedVehicle:
 
     def state(self) -> VehicleSample:
         """Mode, arming and landed state."""
+        return VehicleSample(self.time_s, *self.condition)
+
+    @property
+    def condition(self) -> tuple[FlightMode, bool, bool]:
+        """Mode, whether it is armed, whether it is in the air."""
         commander = self._autopilot.commander
-        return VehicleSample(self.time_s, commander.mode, commander.armed, not self._autopilot.land_detector.landed)
+        return commander.mode, commander.armed, not self._autopilot.land_detector.landed
 
     def health(self) -> HealthSample:
         """Estimator and GNSS."""

@@ -32,6 +32,13 @@ class Glide:
     start_s: float
     duration_s: float
 
+    def offset_at(self, time_s: float) -> tuple[float, float, float]:
+        """What is left of the offset [m] at one time of the clock [s]."""
+        s = min(max((time_s - self.start_s) / self.duration_s, 0.0), 1.0)
+        share = 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        x, y, z = self.offset_m.tolist()
+        return share * x, share * y, share * z
+
     def onto(self, reference: ReferenceHorizon) -> ReferenceHorizon:
         """The reference with the rest of the offset added; the same object once it has faded out."""
         times = reference.time_s

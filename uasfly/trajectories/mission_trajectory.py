@@ -135,6 +135,10 @@ class MissionTrajectory:
         yaw, yaw_rate = self._yaw.sample(times_s)
         return ReferenceHorizon(times_s, position, velocity, acceleration, yaw, yaw_rate)
 
+    def position_at(self, time_s: float) -> tuple[float, float, float]:
+        """Position [m] of the reference at one time [s], without arrays."""
+        return self._table.position_at(time_s)
+
     def span_at(self, time_s: float) -> Span:
         """The leg or transition at a time; the first before the start, the last after the end."""
         return self.spans[max(bisect_right(self._starts, time_s) - 1, 0)]

@@ -47,14 +47,16 @@ class Pacing:
 
     def mission_time_s(self, clock_s: float) -> float:
         """The mission's time at a time of the clock."""
-        return float(self._at(np.array([clock_s]))[0][0])
+        return self._scalars_at(clock_s)[0]
 
     def pace(self, clock_s: float) -> float:
         """The rate at a time of the clock."""
-        return float(self._at(np.array([clock_s]))[1][0])
+        return self._scalars_at(clock_s)[1]
 
     def onto(self, timed: Timed, clock_s: Array) -> ReferenceHorizon:
         """The reference at (n,) times of the clock, with its derivatives by the clock."""
+        if self._from == self._to or bool((clock_s >= self._clock_s + CHANGE_S).all()):
+            return self._onto_steadily(timed, clock_s)
         mission_s, pace, change = self._at(clock_s)
         reference = timed.sample(mission_s)
         velocity, acceleration = reference.velocity_in_world, reference.acceleration_in_world
@@ -66,6 +68,27 @@ class Pacing:
             reference.yaw_rad,
             reference.yaw_rate_rad_s * pace,
         )
+
+    def _onto_steadily(self, timed: Timed, clock_s: Array) -> ReferenceHorizon:
+        """The same where the pace does not change, which is nearly always."""
+        begin_s, pace = self._clock_s + CHANGE_S, self._to
+        reference = timed.sample(self._scalars_at(begin_s)[0] + pace * (clock_s - begin_s))
+        velocity, acceleration = reference.velocity_in_world, reference.acceleration_in_world
+        yaw_rate = reference.yaw_rate_rad_s
+        if pace != 1.0:
+            velocity, acceleration, yaw_rate = velocity * pace, acceleration * (pace * pace), yaw_rate * pace
+        return ReferenceHorizon(
+            clock_s, reference.position_in_world, velocity, acceleration, reference.yaw_rad, yaw_rate
+        )
+
+    def _scalars_at(self, clock_s: float) -> tuple[float, float]:
+        """Mission time and pace at one time of the clock."""
+        elapsed = clock_s - self._clock_s
+        u = min(max(elapsed / CHANGE_S, 0.0), 1.0)
+        change = self._to - self._from
+        gone = CHANGE_S * u**3 * (1.0 - 0.5 * u) + max(elapsed - CHANGE_S, 0.0)
+        mission = self._mission_s + self._from * elapsed + change * gone
+        return mission, self._from + change * u * u * (3.0 - 2.0 * u)
 
     def _at(self, clock_s: Array) -> tuple[Array, Array, Array]:
         """Mission time, pace and its derivative at (n,) times of the clock."""

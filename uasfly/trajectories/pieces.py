@@ -10,6 +10,8 @@ acceleration are the exact derivatives. One table for a whole mission makes samp
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -90,11 +92,16 @@ class PieceTable:
         polynomials = pieces.polynomials.copy()
         if offset is not None:
             polynomials[:, 0, CUBIC] += offset
-        self._derivatives = _polynomials_and_derivatives(polynomials)
+        self._derivatives = np.ascontiguousarray(_polynomials_and_derivatives(polynomials).transpose(0, 2, 1))
+        self._start_list: list[float] = self._starts.tolist()
+        self._coefficients: list[list[list[float]]] = polynomials.transpose(0, 2, 1).tolist()
         distinct, groups = np.unique(pieces.harmonics.reshape(-1, HARMONICS * 3), axis=0, return_inverse=True)
         self._groups: NDArray[np.intp] = groups.reshape(-1)  # pieces of one leg share their harmonics
-        self._curved = [bool(vectors.any()) for vectors in distinct]
-        self._vectors = _vectors_and_derivatives(distinct.reshape(-1, HARMONICS, 3))
+        self._group_list: list[int] = self._groups.tolist()
+        vectors = distinct.reshape(-1, HARMONICS, 3)
+        self._amplitudes: list[list[list[float]]] = vectors.tolist()
+        self._harmonics = [HARMONICS if v[2:].any() else 2 if v.any() else 0 for v in vectors]
+        self._vectors = _vectors_and_derivatives(vectors)
 
     def sample_long(self, times_s: Array) -> tuple[Array, Array, Array]:
         """The same as `sample` in bounded memory, for very many times."""
@@ -106,38 +113,62 @@ class PieceTable:
         """Position [m], velocity [m/s] and acceleration [m/s^2], each (n, 3), at (n,) times [s], which are clamped."""
         times = np.minimum(np.maximum(times_s, 0.0), self.duration_s)
         index = self._starts.searchsorted(times, "right") - 1
-        t = times - self._starts.take(index)
-        powers = np.ones((t.size, 1, 4))
-        square = t * t
-        powers[:, 0, 1] = t
-        powers[:, 0, 2] = square
-        powers[:, 0, 3] = square * t
-        motion = (powers @ self._derivatives.take(index, axis=0))[:, 0]
-        position, velocity, acceleration = motion[:, 0:3], motion[:, 3:6], motion[:, 6:9]
-        groups = self._groups.take(index)
-        group = int(groups[0]) if t.size else 0
-        same = not np.count_nonzero(groups - group)
-        if same and not self._curved[group]:
-            return position.copy(), velocity.copy(), acceleration.copy()
-        scaled = _scaled_harmonics(motion[:, 9:])
-        if same:
-            curved = motion[:, :9] + scaled @ self._vectors[group]
+        first = int(index[0]) if times.size else 0
+        one = not np.count_nonzero(index - first)  # all in one piece, as most horizons are
+        powers = np.empty((4, times.size))
+        t = powers[1]
+        powers[0] = 1.0
+        np.subtract(times, self._starts[first] if one else self._starts.take(index), out=t)
+        np.multiply(t, t, out=powers[2])
+        np.multiply(powers[2], t, out=powers[3])
+        if one:
+            motion = self._derivatives[first] @ powers
+            group, same = self._group_list[first], True
         else:
-            curved = motion[:, :9] + (scaled[:, None, :] @ self._vectors.take(groups, axis=0))[:, 0]
-        return curved[:, 0:3].copy(), curved[:, 3:6].copy(), curved[:, 6:9].copy()
+            motion = (self._derivatives.take(index, axis=0) @ powers.T[:, :, None])[:, :, 0].T
+            groups = self._groups.take(index)
+            group = int(groups[0])
+            same = not np.count_nonzero(groups - group)
+        if not same:
+            scaled = _scaled_harmonics(motion[9:], HARMONICS).T
+            motion[:9] += (self._vectors.take(groups, axis=0) @ scaled[:, :, None])[:, :, 0].T
+        elif self._harmonics[group]:
+            count = self._harmonics[group]
+            motion[:9] += self._vectors[group][:, : 4 * count] @ _scaled_harmonics(motion[9:], count)
+        return motion[0:3].T.copy(), motion[3:6].T.copy(), motion[6:9].T.copy()
+
+    def position_at(self, time_s: float) -> tuple[float, float, float]:
+        """Position [m] at one time [s], clamped, without arrays."""
+        time_s = min(max(time_s, 0.0), self.duration_s)
+        piece = bisect_right(self._start_list, time_s) - 1
+        t = time_s - self._start_list[piece]
+        x, y, z, phase = (((d * t + c) * t + b) * t + a for a, b, c, d in self._coefficients[piece])
+        group = self._group_list[piece]
+        if self._harmonics[group]:
+            cosine, sine = math.cos(phase), math.sin(phase)
+            doubled = cosine * cosine - sine * sine, 2.0 * cosine * sine
+            for share, (ax, ay, az) in zip((cosine, sine, *doubled), self._amplitudes[group], strict=True):
+                x, y, z = x + share * ax, y + share * ay, z + share * az
+        return x, y, z
 
 
-def _scaled_harmonics(phase: Array) -> Array:
-    """Harmonics (4) times 1, rate, acceleration and squared rate (n, 16) of phase, its rate and acceleration (n, 3)."""
-    turned = np.exp(1j * phase[:, 0])
-    harmonics = np.empty((len(phase), HARMONICS // 2), dtype=complex)
-    harmonics[:, 0] = turned
-    harmonics[:, 1] = turned * turned
-    factors = np.ones((len(phase), 4, 1))
-    factors[:, 1:3, 0] = phase[:, 1:]
-    factors[:, 3, 0] = phase[:, 1] * phase[:, 1]
-    scaled: Array = factors * harmonics.view(float)[:, None, :]
-    return scaled.reshape(-1, 4 * HARMONICS)
+def _scaled_harmonics(phase: Array, count: int) -> Array:
+    """First `count` harmonics times 1, rate, acceleration and squared rate (4 count, n), harmonic by harmonic.
+
+    Args:
+        phase: (3, n) phase, its rate and acceleration.
+        count: 2 or HARMONICS.
+    """
+    scaled = np.empty((count, 4, phase.shape[1]))
+    harmonics = scaled[:, 0]
+    cosine, sine = np.cos(phase[0], out=harmonics[0]), np.sin(phase[0], out=harmonics[1])
+    if count == HARMONICS:
+        np.subtract(cosine * cosine, sine * sine, out=harmonics[2])
+        np.multiply(2.0 * cosine, sine, out=harmonics[3])
+    np.multiply(harmonics, phase[1], out=scaled[:, 1])
+    np.multiply(harmonics, phase[2], out=scaled[:, 2])
+    np.multiply(scaled[:, 1], phase[1], out=scaled[:, 3])
+    return scaled.reshape(4 * count, -1)
 
 
 def _polynomials_and_derivatives(polynomials: Array) -> Array:
@@ -150,7 +181,7 @@ def _polynomials_and_derivatives(polynomials: Array) -> Array:
 
 
 def _vectors_and_derivatives(vectors: Array) -> Array:
-    """What turns `_scaled_harmonics` into position, velocity and acceleration: (n, 16, 9), from vectors (n, 4, 3).
+    """What turns `_scaled_harmonics` into position, velocity and acceleration: (n, 9, 16), from vectors (n, 4, 3).
 
     With u(theta) the harmonic part of the path: u, u' theta' and u' theta'' + u'' theta'^2.
     """
@@ -161,4 +192,4 @@ def _vectors_and_derivatives(vectors: Array) -> Array:
     result[:, 1, :, 3:6] = slope
     result[:, 2, :, 6:9] = slope
     result[:, 3, :, 6:9] = -(order**2) * vectors
-    return result.reshape(-1, 4 * HARMONICS, 9)
+    return np.ascontiguousarray(result.transpose(0, 3, 2, 1)).reshape(-1, 9, 4 * HARMONICS)

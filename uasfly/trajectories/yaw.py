@@ -104,6 +104,7 @@ class YawTable:
         widths, coefficients = zip(*(_hermite(span) for span in spans), strict=True)
         width = np.concatenate(widths)
         self._coefficients = np.concatenate(coefficients, axis=1)
+        self._constant = [not any(cubic) for cubic in self._coefficients[1:].T.tolist()]
         ends = np.cumsum(width)
         self._starts = np.concatenate(([0.0], ends[:-1]))
         self._end = float(ends[-1])
@@ -112,6 +113,9 @@ class YawTable:
         """Yaw [rad] and yaw rate [rad/s], (n,) each, at (n,) times, which are clamped."""
         times = np.minimum(np.maximum(times_s, 0.0), self._end)
         index = self._starts.searchsorted(times, "right") - 1
+        first = int(index[0]) if times.size else 0
+        if self._constant[first] and not np.count_nonzero(index - first):
+            return np.full(times.size, self._coefficients[0, first]), np.zeros(times.size)
         t = times - self._starts.take(index)
         c = self._coefficients.take(index, axis=1)
         slope = c[1] + t * (2.0 * c[2] + 3.0 * t * c[3])

@@ -21,7 +21,11 @@ SEVERITIES = {
 
 
 class Lasting:
-    """Turns a finding now into an action: NOTHING, `action`, and `then` where that is given."""
+    """Turns a finding now into an action: NOTHING, `action`, and `then` where that is given.
+
+    Attributes:
+        idle: nothing is found or lasts, so that another update without a finding changes nothing.
+    """
 
     def __init__(self, settings: Monitor) -> None:
         """Take the times and actions."""
@@ -32,6 +36,7 @@ class Lasting:
         self._gone_s: float | None = None
         self._acted_s: float | None = None
         self._grown = False
+        self.idle = True
 
     def update(self, time_s: float, found: bool) -> Action:
         """The action at `time_s`; times must not fall."""
@@ -49,6 +54,7 @@ class Lasting:
                     self._gone_s = time_s
                 if time_s - self._gone_s >= settings.clear_s:
                     self._acted_s = None
+        self.idle = not found and self._acted_s is None
         if self._acted_s is None:
             self._grown = False
             return Action.NOTHING
@@ -79,6 +85,8 @@ class Watch:
     def check(self, watched: Watched) -> Alarm | None:
         """The alarm that lasts, the same object as long as its action does."""
         text = self._find(watched) if watched.flying or not self._flying_only else ""
+        if not text and self._lasting.idle:  # nearly always
+            return None
         action = self._lasting.update(watched.time_s, bool(text))
         if action is Action.NOTHING:
             self._alarm = None

@@ -10,7 +10,7 @@ from uasfly.messages import Array, Authority, StateEstimate
 from uasfly.observer.diagnosis import Diagnosis
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Watched:
     """One cycle.
 
