@@ -40,3 +40,26 @@ class RehearsalProgress:
         if self._cycles % CYCLES_PER_UPDATE == 0:
             text = f"{self._name}: {status.phase.value}"
             self._progress.update(self._task, completed=status.progress, description=text)
+
+
+class BenchProgress:
+    """Shows on stderr what the bench is measuring."""
+
+    def __init__(self) -> None:
+        console = Console(stderr=True)
+        columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+        self._progress = Progress(*columns, console=console, disable=not console.is_terminal)
+        self._task = self._progress.add_task("bench", total=1.0)
+
+    def __enter__(self) -> BenchProgress:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None
+    ) -> None:
+        self._progress.stop()
+
+    def update(self, text: str, done: float) -> None:
+        """Tell what is measured now, and the share that has been."""
+        self._progress.update(self._task, completed=done, description=text)

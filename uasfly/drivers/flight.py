@@ -106,7 +106,7 @@ def _fly_simulated(prepared: _Prepared) -> dict[str, Any]:
     plan = prepared.plan
     assert plan.scenario is not None
     assert plan.plant is not None
-    port = _free_port()
+    port = free_port()
     prepared.say(f"simulated {plan.airframe.name} in {plan.scenario.name}, seed {plan.seed}")
     with start_process(plan.plant, plan.scenario, plan.seed, remote_port=port, local_port=0) as vehicle:
         summary = asyncio.run(_connect_and_fly(prepared, f"udpin://127.0.0.1:{port}", SIMULATED_ID))
@@ -155,7 +155,7 @@ def _engage(flight: Flight) -> Engage:
         raise UasflyError(f"--engage: expected auto or pilot, found {flight.engage!r}") from None
 
 
-def _free_port() -> int:
+def free_port() -> int:
     """A UDP port on loopback that nobody has just now."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
