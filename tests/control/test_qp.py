@@ -15,11 +15,11 @@ from uasfly.control.compiled import CompiledBackend
 from uasfly.control.problem import Problem
 from uasfly.control.qp import QpOptions, QpSolution, QpSolver, SolveStatus, StageQp
 from uasfly.control.qp_riccati import RiccatiQp
-from uasfly.control.riccati import stage_functions
+from uasfly.control.riccati_machine import machine_functions
 from uasfly.control.workspace import Workspace
 
 MakeSolver = Callable[[Problem, QpOptions], QpSolver]
-STAGES = stage_functions(PATTERN)
+STAGES = machine_functions(PATTERN)
 INTERIOR_ONLY = QpOptions(active_set_sweeps=0, polish_sweeps=0)
 
 

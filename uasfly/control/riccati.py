@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from uasfly.control.transcription import JacobianPattern
-from uasfly.model import INPUTS, STATES
+from uasfly.model import INPUTS, ROLL, STATES
 
 PACKED = STATES * (STATES + 1) // 2  # upper triangle of P, by columns
 PACKED_INPUTS = INPUTS * (INPUTS + 1) // 2
@@ -105,8 +105,14 @@ class _Factor:
         return ca.vertcat(*rows)
 
 
-def stage_functions(pattern: JacobianPattern) -> StageFunctions:
-    """The stage functions for a Jacobian pattern."""
+def stage_functions(pattern: JacobianPattern, *, products_given: bool = False) -> StageFunctions:
+    """The stage functions for a Jacobian pattern.
+
+    Args:
+        pattern: of [A B].
+        products_given: whether `backward` and `barrier_backward` take two products of P before all other arguments, for
+            callers that have them cheaper: with the last columns of [A B] from roll on (8 rows), and with c + B fixed.
+    """
     symbol = ca.SX.sym
     cost, slope, packed, defect = (
         symbol("P", PACKED),
@@ -122,7 +128,13 @@ def stage_functions(pattern: JacobianPattern) -> StageFunctions:
     a, b = jacobian[:, :STATES], jacobian[:, STATES:]
 
     hessian = _symmetric(cost, STATES)
-    carried_x, carried_u = hessian @ a, hessian @ b
+    carried, cost_of_defect = hessian @ jacobian[:, ROLL:], hessian @ defect
+    cost_of_held = hessian @ (defect + b @ fixed)
+    given: list[ca.SX] = []
+    if products_given:
+        carried, cost_of_defect = symbol("PJ", *carried.shape), symbol("Pd", STATES)
+        given, cost_of_held = [carried, cost_of_defect], cost_of_defect
+    carried_x, carried_u = ca.horzcat(hessian @ a[:, :ROLL], carried[:, : STATES - ROLL]), carried[:, STATES - ROLL :]
     h_xx, h_ux, h_uu = ca.diag(weight_x) + a.T @ carried_x, carried_u.T @ a, ca.diag(weight_u) + b.T @ carried_u
 
     def eliminate(uu: ca.SX, ux: ca.SX, u: ca.SX, x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, _Factor]:
@@ -140,14 +152,13 @@ def stage_functions(pattern: JacobianPattern) -> StageFunctions:
     for i in range(INPUTS):
         for k in range(INPUTS):
             masked[i, k] = free[i] * free[k] * h_uu[i, k] if i != k else free[i] * h_uu[i, i] + (1.0 - free[i])
-    ahead = hessian @ (defect + b @ fixed) + slope
+    ahead = cost_of_held + slope
     h_u = r + weight_u * fixed + b.T @ ahead
     p_next, s_next, big_k, small_k, _ = eliminate(masked, ca.diag(free) @ h_ux, free * h_u, q + a.T @ ahead)
-    arguments = [cost, slope, packed, defect, q, r, weight_x, weight_u]
+    arguments = [*given, cost, slope, packed, defect, q, r, weight_x, weight_u]
     results = [p_next, s_next, big_k, small_k, ca.vec(h_ux), upper_triangle(h_uu), h_u]
     backward = _function("uasfly_backward", [*arguments, free, fixed], results)
 
-    cost_of_defect = hessian @ defect
     ahead = cost_of_defect + slope
     p_next, s_next, big_k, small_k, factor = eliminate(h_uu, h_ux, r + b.T @ ahead, q + a.T @ ahead)
     results = [p_next, s_next, big_k, small_k, factor.packed(), cost_of_defect]

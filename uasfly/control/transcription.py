@@ -95,6 +95,20 @@ class JacobianPattern:
             entries[index] = packed[place]
         return ca.SX(self.sparsity, ca.vertcat(*entries))
 
+    def last_columns(self, packed: ca.MX, first: int) -> ca.MX:
+        """Columns of [A B] from `first` on, of a packed vector; a product with them skips the zeros.
+
+        Raises:
+            ValueError: where one of their entries does not vary.
+        """
+        before = self.sparsity.colind()[first]
+        count = self.sparsity.nnz() - before
+        if self.varying[-count:] != tuple(range(before, before + count)):
+            raise ValueError(f"columns from {first} on have entries that do not vary")
+        places = [index - before for index in self.sparsity.colind()[first:]]
+        columns = ca.Sparsity(STATES, STATES + INPUTS - first, places, self.sparsity.row()[before:])
+        return ca.MX(columns, packed[packed.numel() - count :])
+
     def dense(self, packed: Array) -> tuple[Array, Array]:
         """Matrices A (N, 8, 8) and B (N, 8, 3) of packed vectors (N, size)."""
         count = packed.shape[0]

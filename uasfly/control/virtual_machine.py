@@ -11,7 +11,7 @@ from uasfly.control.problem import Problem
 from uasfly.control.qp import QpOptions, QpSolver, SolveStatus, StageQp
 from uasfly.control.qp_riccati import RiccatiQp
 from uasfly.control.references import input_reference_function, trim_function
-from uasfly.control.riccati import stage_functions
+from uasfly.control.riccati_machine import machine_functions
 from uasfly.control.stagewise import Stagewise
 from uasfly.control.transcription import linearisation_function
 from uasfly.control.workspace import Workspace
@@ -29,7 +29,7 @@ class VirtualMachineBackend:
         work, nodes = workspace, problem.grid.nodes
         linearise, pattern = linearisation_function()
         self._problem, self._workspace = problem, workspace
-        self._qp: QpSolver = qp or RiccatiQp(stage_functions(pattern), pattern.size, nodes, options)
+        self._qp: QpSolver = qp or RiccatiQp(machine_functions(pattern), pattern.size, nodes, options)
         self._shift: tuple[float, Shift] = (0.0, Shift.after(problem.grid, 0.0))
 
         self._lower, self._upper = (np.tile(bound, (nodes, 1)) for bound in (problem.input_lower, problem.input_upper))
