@@ -7,7 +7,7 @@ import sys
 import typer
 
 from uasfly import __version__
-from uasfly.cli import check, faults, fly, preflight, rehearse, sim
+from uasfly.cli import campaign, check, faults, fly, preflight, rehearse, sim
 
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
@@ -41,6 +41,7 @@ rehearse.register(app)
 check.register(app)
 sim.register(app)
 faults.register(app)
+campaign.register(app)
 
 
 def main() -> None:
