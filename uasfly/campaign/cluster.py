@@ -18,7 +18,7 @@ from uasfly.errors import UasflyError, describe_error
 CONNECT_TIMEOUT_S = 15.0
 WORKERS_TIMEOUT_S = 30.0
 WAITING = 2  # flights that a worker's thread has waiting beside the one it flies: no more, so that memory stays small
-DEATHS = 2  # workers that may die of a flight before it is given up
+DEATHS = 2  # workers that may die of a flight; at the next one it is given up
 INSTALL = "pip install 'uasfly[campaign]'"
 
 
@@ -54,6 +54,7 @@ def local_client(workers: int) -> Iterator[Any]:
             dashboard_address=None,
             memory_limit=0,
             silence_logs=logging.CRITICAL,
+            preload="uasfly.campaign.worker",
         ) as cluster,
         Client(cluster) as client,
     ):
@@ -147,7 +148,7 @@ def fly_on(client: Any, flights: list[Flight], plan_of: PlanOf, code: str) -> It
     def wanted() -> int:
         return max(0, (1 + WAITING) * _threads(client) - len(in_the_air))
 
-    landed = as_completed([submit(flight) for flight in itertools.islice(waiting, wanted())])
+    landed = as_completed([submit(flight) for flight in itertools.islice(waiting, wanted())], loop=client.loop)
     for future in landed:
         flight = in_the_air.pop(future.key)
         if future.status == "finished":
@@ -173,5 +174,5 @@ def _lost(error: BaseException) -> str:
     from distributed import KilledWorker
 
     if isinstance(error, KilledWorker):
-        return f"the worker died, and {DEATHS} more after it; is there memory enough?"
+        return "the workers that flew it died, one after the other; is there memory enough?"
     return describe_error(error)

@@ -190,6 +190,7 @@ class FlightList:
             try:
                 value = text.checked(model, overrides)
             except FileError as error:
+                text.checked(model)  # a file that is wrong by itself says so
                 raise self._blamed(error, kind, overrides) from None
             if len(self._models) >= KEPT_MODELS:  # scattered values come once or a few times
                 self._models.clear()

@@ -8,6 +8,7 @@ import os
 import tempfile
 import types
 from collections.abc import Callable
+from io import FileIO
 from pathlib import Path
 from typing import IO, Any
 
@@ -33,7 +34,7 @@ class ResultsFolder:
         self.path = path
         self.results: dict[str, Result] = {}
         self._lock: IO[str] | None = None
-        self._journal: IO[bytes] | None = None
+        self._journal: FileIO | None = None
 
     def __enter__(self) -> ResultsFolder:
         """Make and lock the folder and read the journal.
@@ -55,7 +56,7 @@ class ResultsFolder:
             self._lock.truncate(0)
             self._lock.write(f"{os.getpid()}\n")
             self._lock.flush()
-            self._journal = (self.path / JOURNAL).open("a+b")
+            self._journal = (self.path / JOURNAL).open("ab", buffering=0)  # what does not fit shows at once
             self._read()
         except OSError as error:
             self.__exit__(None, None, None)
@@ -78,8 +79,9 @@ class ResultsFolder:
         """
         assert self._journal is not None
         try:
-            self._journal.write(json.dumps({"id": identity, **result}).encode() + b"\n")
-            self._journal.flush()
+            line = memoryview(json.dumps({"id": identity, **result}).encode() + b"\n")
+            while line:
+                line = line[self._journal.write(line) :]
             os.fsync(self._journal.fileno())
         except OSError as error:
             raise _unusable(self.path, error) from error
@@ -99,9 +101,9 @@ class ResultsFolder:
 
     def _read(self) -> None:
         assert self._journal is not None
-        self.results, whole = read_journal(self._journal)
+        with (self.path / JOURNAL).open("rb") as stream:
+            self.results, whole = read_journal(stream)
         self._journal.truncate(whole)  # what was being written when the last campaign was killed
-        self._journal.seek(0, os.SEEK_END)
 
 
 def journal_results(folder: Path) -> dict[str, Result]:
@@ -122,7 +124,6 @@ def journal_results(folder: Path) -> dict[str, Result]:
 
 def read_journal(stream: IO[bytes]) -> tuple[dict[str, Result], int]:
     """Results by flight id, and how many bytes of the journal are whole lines."""
-    stream.seek(0)
     results: dict[str, Result] = {}
     whole = 0
     for line in stream:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-import uasfly
 from uasfly import __version__
 
 # Neither what is shown nor how flights are handed out changes how one goes.
@@ -23,7 +22,7 @@ def code_digest() -> str:
 
     The version alone would not do: while uasfly is being worked on it stays the same.
     """
-    folder = Path(uasfly.__file__).parent
+    folder = Path(__file__).parent.parent
     digest = hashlib.sha256(__version__.encode())
     for path in sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".c")):
         name = path.relative_to(folder)
@@ -53,9 +52,7 @@ def flight_id(digests: list[str], controller: str, seed: int) -> str:
 
 def facts() -> dict[str, str]:
     """What must be the same on all machines of a campaign, so that its rows are."""
-    import casadi
-    import numpy as np
-    import scipy
+    from importlib.metadata import version
 
     from uasfly.control.native_library import NativeUnavailableError, load_library
 
@@ -68,7 +65,5 @@ def facts() -> dict[str, str]:
         "uasfly": __version__,
         "code": code_digest(),
         "solver": solver,
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "casadi": casadi.__version__,
+        **{name: version(name) for name in ("numpy", "scipy", "casadi")},
     }

@@ -28,9 +28,9 @@ def rms_boxes(rows: Sequence[Row], swept: Sequence[str], path: Path) -> None:
         for what, members in groups
         if (values := [100.0 * value for value in completed_rms(members)])
     ]
-    title = "Tracking RMS of completed flights"
+    title = "Tracking RMS of completed flights (line: median, box: middle half, points: flights)"
     if len(boxes) > MOST_BOXES:
-        title += f", the {MOST_BOXES} of {len(boxes)} groups with the worst flights"
+        title += f"\nthe {MOST_BOXES} of {len(boxes)} groups with the worst flights"
         least = sorted((max(values) for _, values in boxes), reverse=True)[MOST_BOXES - 1]
         boxes = [box for box in boxes if max(box[1]) >= least][:MOST_BOXES]
     figure, axes = _figure(0.42 * len(boxes))
@@ -83,14 +83,14 @@ def success_against_wind(rows: Sequence[Row], path: Path) -> None:
         above = [100.0 * high - rate for rate, (_, high) in zip(rates, bounds, strict=True)]
         places = [speed + aside * (number - (len(shown) - 1) / 2.0) for speed in speeds]
         what = dict(zip(("airframe", "mission", "controller"), key, strict=True))
-        name = _line_label(what, among)
+        name = label(what, among)
         axes.errorbar(places, rates, [below, above], fmt="o-", capsize=4, color=_COLOURS[number], label=name)
-    counts = {sum(row["wind_m_s"] == wind for row in rows) for wind in winds}
+    counts = {len(flown) for _, by_wind in shown for flown in by_wind.values()}
     axes.set_ylim(-3.0, 103.0)
     axes.set_ylabel("successful flights [%]")
     flights = f"{min(counts)} to {max(counts)}" if len(counts) > 1 else f"{min(counts)}"
     axes.set_xlabel(
-        f"mean wind of the scenario (at 10 m; jets: on the axis at their aim) [m/s], {flights} flights each"
+        f"mean wind of the scenario (at 10 m; jets: on the axis at their aim) [m/s], {flights} flights a point"
     )
     axes.legend(loc="best", framealpha=0.9)
     _save(figure, path)
@@ -123,11 +123,6 @@ def worst_flights(rows: Sequence[Row], swept: Sequence[str], path: Path) -> None
     handles.append(Line2D([], [], marker="|", color="black", linestyle="", markersize=11, label="largest error"))
     axes.legend(handles=handles, loc="lower right", framealpha=0.9)
     _save(figure, path)
-
-
-def _line_label(what: dict[str, str], among: Sequence[dict[str, str]]) -> str:
-    names = [name for name in what if any(other[name] != what[name] for other in among)] or list(what)
-    return ", ".join(what[name] for name in names)
 
 
 def _figure(height_inches: float) -> tuple[Any, Any]:

@@ -69,10 +69,16 @@ def summarise(rows: Sequence[Row], swept: Sequence[str]) -> list[Group]:
 def label(what: dict[str, Any], among: Sequence[dict[str, Any]]) -> str:
     """A group in few words: what it does not share with all others; all of its names where there is one group only."""
     shared = {name for name in what if all(other[name] == what[name] for other in among)}
-    names = [name for name in what if name not in shared] or list(IDENTITY)
-    return ", ".join(
-        str(what[name]) if name in IDENTITY else f"{name.rpartition('.')[2]} {json.dumps(what[name])}" for name in names
-    )
+    names = [name for name in what if name not in shared] or [name for name in IDENTITY if name in what]
+    ends = [name.rpartition(".")[2] for name in what]
+    words = []
+    for name in names:
+        if name in IDENTITY:
+            words.append(str(what[name]))
+        else:
+            end = name.rpartition(".")[2]
+            words.append(f"{end if ends.count(end) == 1 else name}={json.dumps(what[name])}")
+    return ", ".join(words)
 
 
 def wilson(successes: int, count: int, confidence: float = CONFIDENCE) -> Interval:
