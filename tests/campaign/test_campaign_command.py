@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.campaign.conftest import SHORT, write_campaign
+from uasfly.cli.main import main
 
 COMMAND = [sys.executable, "-c", "from uasfly.cli.main import main; main()", "campaign"]
 WITHOUT_EXTRA = (
@@ -54,14 +55,22 @@ def test_a_dry_run_lists_and_touches_nothing(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_input_ends_with_a_message_and_exit_code_2(
-    tmp_path: Path, arguments: tuple[str, ...], message: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    message: str,
 ) -> None:
     """No traceback."""
     write_campaign(tmp_path)
-    result = _run(*arguments, folder=tmp_path)
-    assert result.returncode == 2
-    assert message in result.stderr
-    assert "Traceback" not in result.stderr
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["uasfly", "campaign", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    errors = capsys.readouterr().err
+    assert message in errors
+    assert "Traceback" not in errors
 
 
 def test_without_the_extra_one_process_flies_all_the_same(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from uasfly.campaign.flights import Flight, FlightList
 from uasfly.campaign.fly import Result
 from uasfly.campaign.folder import ResultsFolder
 from uasfly.campaign.identity import code_digest, facts
+from uasfly.campaign.interruption import Interruption
 from uasfly.campaign.report import write_results
 from uasfly.campaign.table import rows_of, succeeded
 from uasfly.errors import UasflyError
@@ -70,8 +71,9 @@ def run_campaign(
         if missing:
             repeats = len(flights.flights) - len(there) - len(missing)
             progress.begin(len(there) + repeats, len(flights.flights), successes)
-            with _flown(flights, missing, where, say) as flown:
+            with Interruption() as interruption, _flown(flights, missing, where, say) as flown:
                 for flight, result in flown:
+                    interruption.check()
                     folder.keep(flight.id, result)
                     progress.landed(succeeded(result, success))
         return write_results(folder, flights, rows_of(flights, folder.results))
