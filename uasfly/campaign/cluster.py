@@ -42,7 +42,8 @@ def local_client(workers: int) -> Iterator[Any]:
         "distributed.scheduler.allowed-failures": DEATHS,
         "distributed.nanny.pre-spawn-environ": ONE_THREAD,  # before numpy is imported there
         "distributed.worker.profile.enabled": False,
-        "distributed.admin.tick.limit": "30s",
+        **{f"distributed.admin.{what}.interval": "2s" for what in ("tick", "system-monitor")},  # not 20 ms
+        "distributed.admin.tick.limit": "60s",
         "distributed.comm.timeouts.connect": "30s",
     }
     with (
