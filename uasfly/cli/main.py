@@ -7,7 +7,7 @@ import sys
 import typer
 
 from uasfly import __version__
-from uasfly.cli import bench, check, faults, fly, preflight, rehearse, sim
+from uasfly.cli import bench, campaign, check, faults, fly, preflight, rehearse, sim
 
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
@@ -42,6 +42,7 @@ check.register(app)
 sim.register(app)
 faults.register(app)
 bench.register(app)
+campaign.register(app)
 
 
 def main() -> None:
