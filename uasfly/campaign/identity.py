@@ -54,10 +54,11 @@ def facts() -> dict[str, str]:
     """What must be the same on all machines of a campaign, so that its rows are."""
     from importlib.metadata import version
 
-    from uasfly.control.native_library import NativeUnavailableError, load_library
+    from uasfly.control.native_library import load_solver
+    from uasfly.native import NativeUnavailableError
 
     try:
-        load_library()  # compiled here and now, where it is not yet, and not by all workers at once
+        load_solver()  # compiled here and now, where it is not yet, and not by all workers at once
         solver = "compiled"
     except NativeUnavailableError:
         solver = "virtual machine"
