@@ -42,8 +42,7 @@ class _SquareSum:
         self.y += y
         self.z += z
         square = x + y + z
-        if square > self.largest_square:
-            self.largest_square = square
+        self.largest_square = max(self.largest_square, square)
 
     @property
     def largest(self) -> float:
