@@ -48,7 +48,8 @@ class Odometry:
 
 def plausible(values: list[float], largest_squared: float = _LARGEST_SQUARED) -> bool:
     """Whether every number is finite and none is absurdly large."""
-    return sum(map(mul, values, values)) < largest_squared  # False for NaN
+    total: float = sum(map(mul, values, values))
+    return total < largest_squared  # False for NaN
 
 
 def checked_odometry(sample: OdometrySample) -> Odometry | None:
