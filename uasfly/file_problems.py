@@ -22,6 +22,7 @@ _NAMES: Mapping[object, tuple[str, str]] = {
     int: ("a whole number", "whole numbers"),
     str: ("a text", "texts"),
     bool: ("true or false", "true or false values"),
+    object: ("a value", "values"),
 }
 
 

@@ -5,6 +5,7 @@ Every problem names line, field, what was expected and what was found; `--set` v
 
 from __future__ import annotations
 
+import copy
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -39,13 +40,39 @@ def load_file(path: Path, model: type[M], overrides: Mapping[str, object] = _NO_
     Raises:
         FileError: the file cannot be read, is no YAML, or is not what the model describes; it carries every problem.
     """
-    data, document = _read_mapping(path)
-    paths = _apply_overrides(data, document.lines, overrides, str(path))
-    try:
-        # JSON mode is strict about types (no "1.8" or true for a number) and still takes lists for tuples.
-        return model.model_validate_json(json.dumps(data), strict=True)
-    except ValidationError as error:
-        raise FileError(str(path), describe_problems(error, model, _Where(document, paths))) from None
+    return FileText(path).checked(model, overrides)
+
+
+class FileText:
+    """A YAML file that is read once and then checked as often as there are overrides to try."""
+
+    def __init__(self, path: Path) -> None:
+        """Read the file.
+
+        Raises:
+            FileError: the file cannot be read or is no YAML mapping.
+        """
+        self.path = path
+        self._data, self._document = _read_mapping(path)
+
+    def checked(self, model: type[M], overrides: Mapping[str, object] = _NO_OVERRIDES) -> M:
+        """What is in the file with some values changed, see `load_file`.
+
+        Raises:
+            FileError: it is not what the model describes; the error carries every problem.
+        """
+        data = copy.deepcopy(self._data)
+        paths = _apply_overrides(data, self._document.lines, overrides, str(self.path))
+        try:
+            # JSON mode is strict about types (no "1.8" or true for a number) and still takes lists for tuples.
+            return model.model_validate_json(json.dumps(data), strict=True)
+        except ValidationError as error:
+            where = _Where(self._document, paths)
+            raise FileError(str(self.path), describe_problems(error, model, where)) from None
+
+    def line(self, *path: str | int) -> int:
+        """Line of a field, or of the nearest block around it that is in the file."""
+        return self._document.line(path)
 
 
 def top_level_fields(path: Path) -> set[str]:
@@ -116,10 +143,29 @@ def parse_overrides(assignments: Sequence[str]) -> dict[str, object]:
         key = key.strip()
         if not equals or not key:
             raise FileError("--set", [f"expected key=value (limits.tilt_deg=25), found {found(assignment)}"])
-        _split_key(key)
+        split_key(key)
         source = f"--set {shortened(key)}"
         overrides[key] = parse_yaml(value, source).data if value.strip() else None
     return overrides
+
+
+def split_key(key: str) -> DataPath:
+    """The path of a field as `--set` names it: "legs[0].radius_m" is ("legs", 0, "radius_m").
+
+    Raises:
+        FileError: it is none.
+    """
+    path: list[str | int] = []
+    position = 0
+    while position < len(key):
+        match = _PATH_PART.match(key, position)
+        if match is None or (position == 0) == key.startswith((".", "["), position):
+            expected = "expected names joined by dots, list indices in brackets (legs[0].radius_m)"
+            raise FileError("--set", [f"{shortened(key)} is not the path of a field; {expected}"])
+        name, index = match.groups()
+        path.append(name if index is None else int(index))
+        position = match.end()
+    return tuple(path)
 
 
 def write_schema(model: type[BaseModel]) -> dict[str, Any]:
@@ -162,27 +208,13 @@ def _read_text(path: Path) -> str:
         raise FileError(source, [problem]) from None
 
 
-def _split_key(key: str) -> DataPath:
-    path: list[str | int] = []
-    position = 0
-    while position < len(key):
-        match = _PATH_PART.match(key, position)
-        if match is None or (position == 0) == key.startswith((".", "["), position):
-            expected = "expected names joined by dots, list indices in brackets (legs[0].radius_m)"
-            raise FileError("--set", [f"{shortened(key)} is not the path of a field; {expected}"])
-        name, index = match.groups()
-        path.append(name if index is None else int(index))
-        position = match.end()
-    return tuple(path)
-
-
 def _apply_overrides(
     data: dict[str, object], lines: Mapping[DataPath, int], overrides: Mapping[str, object], source: str
 ) -> set[DataPath]:
     """Put the values in; sections that are not in the file are made. Gives the changed paths."""
     changed: set[DataPath] = set()
     for key, value in overrides.items():
-        path = _split_key(key)
+        path = split_key(key)
         place: object = data
         for depth, part in enumerate(path):
             last = depth == len(path) - 1

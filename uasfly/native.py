@@ -74,6 +74,8 @@ def compile_functions(
 def find_compiler() -> list[str]:
     """Command of the C compiler: CC from the environment, else cc, gcc or clang.
 
+    `CC="cc -march=native"` makes code for this very processor.
+
     Raises:
         NativeUnavailableError: where none is found.
     """
@@ -151,8 +153,19 @@ def _check_private(path: Path) -> None:
 
 
 def _digest(source: str, command: tuple[str, ...], flags: Sequence[str]) -> str:
-    parts = (source, shlex.join(command), _version(command), shlex.join(flags), platform.machine())
+    words = shlex.join((*command, *flags))
+    parts = (source, words, _version(command), platform.machine(), _processor() if "native" in words else "")
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+
+
+@lru_cache(maxsize=1)
+def _processor() -> str:
+    """What tells processors apart that cannot run each other's code, where the user asks for such code."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return platform.node()
+    return "\n".join(sorted({line for line in lines if line.startswith(("model name", "flags", "Features", "CPU"))}))
 
 
 @lru_cache(maxsize=4)

@@ -7,6 +7,7 @@ import pytest
 
 from tests.control.episodes import episodes, load
 from tests.control.programs import small_problem
+from tests.control.stress import stress
 from uasfly.control.grid import Shift
 from uasfly.control.iteration import RealTimeIteration, make_backend
 from uasfly.control.problem import Problem
@@ -27,17 +28,9 @@ def _solved(backend: str, problem: Problem) -> RealTimeIteration:
 @pytest.mark.parametrize("tight", [False, True])
 def test_stress_every_step_is_finite_inside_and_converged(backend_name: str, tight: bool) -> None:
     """Random starts far off the path: no step fails, none leaves the bounds."""
-    problem = small_problem(25, tight=tight)
-    rti = RealTimeIteration(problem, backend_name)
-    work, count, saturated = rti.workspace, 0, 0.0
-    for status in episodes(rti, 6 if backend_name == "c" else 2, 60, np.random.default_rng(20)):
-        assert status is SolveStatus.CONVERGED
-        assert np.all(np.isfinite(work.states))
-        assert np.all(work.inputs >= problem.input_lower)
-        assert np.all(work.inputs <= problem.input_upper)
-        count += 1
-        saturated += float(np.mean(work.active != 0))
-    assert saturated / count > (0.3 if tight else 0.01)
+    tally = stress(backend_name, tight=tight, nodes=25, count=6 if backend_name == "c" else 2, steps=60, seed=20)
+    assert tally.good, tally
+    assert tally.saturated / tally.steps > (0.3 if tight else 0.01)
 
 
 @pytest.mark.parametrize("tight", [False, True])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -12,13 +13,13 @@ import pytest
 from tests.control.programs import PATTERN, dense_solution, optimality, random_program, small_problem
 from uasfly.control.compiled import CompiledBackend
 from uasfly.control.problem import Problem
-from uasfly.control.qp import QpOptions, QpSolver, SolveStatus
+from uasfly.control.qp import QpOptions, QpSolution, QpSolver, SolveStatus, StageQp
 from uasfly.control.qp_riccati import RiccatiQp
-from uasfly.control.riccati import stage_functions
+from uasfly.control.riccati_machine import machine_functions
 from uasfly.control.workspace import Workspace
 
 MakeSolver = Callable[[Problem, QpOptions], QpSolver]
-STAGES = stage_functions(PATTERN)
+STAGES = machine_functions(PATTERN)
 INTERIOR_ONLY = QpOptions(active_set_sweeps=0, polish_sweeps=0)
 
 
@@ -54,23 +55,33 @@ def test_the_solution_is_the_dense_one(make_solver: MakeSolver, tight: bool) -> 
     assert 0.05 < share < 0.95
 
 
-@pytest.mark.parametrize("nodes", [25, 60])
-def test_the_solution_is_the_librarys(make_solver: MakeSolver, nodes: int) -> None:
-    """To 1e-6 of piqp, on full horizons, bounds active."""
-    pytest.importorskip("piqp")
+@functools.cache
+def _by_the_library(nodes: int, saturated: bool) -> tuple[Problem, list[tuple[StageQp, QpSolution]]]:
+    """Programs and piqp's solutions: close to the reference in a wide box, or far from it in a tight one."""
     from uasfly.control.qp_library import LibraryQp
 
-    problem = small_problem(nodes)
-    solver, library = make_solver(problem, QpOptions()), LibraryQp(PATTERN)
-    rng = np.random.default_rng(11)
-    for _ in range(4):
-        qp = random_program(rng, problem)
-        solution, other = solver.solve(qp, _guess(problem)), library.solve(qp, _guess(problem))
-        assert solution.status is SolveStatus.CONVERGED
+    problem = small_problem(nodes, tight=saturated)
+    rng, library = np.random.default_rng(11), LibraryQp(PATTERN)
+    programs = [random_program(rng, problem, error_m=3.0 if saturated else 0.02) for _ in range(3)]
+    return problem, [(qp, library.solve(qp, _guess(problem))) for qp in programs]
+
+
+@pytest.mark.parametrize("saturated", [False, True])
+@pytest.mark.parametrize("nodes", [30, 60])
+def test_the_solution_is_the_librarys(make_solver: MakeSolver, nodes: int, saturated: bool) -> None:
+    """To 1e-6 of piqp in states and inputs: few bounds active and many, from no guess, the right one and a wild one."""
+    pytest.importorskip("piqp")
+    problem, programs = _by_the_library(nodes, saturated)
+    solver, rng, share = make_solver(problem, QpOptions()), np.random.default_rng(12), 0.0
+    for qp, other in programs:
         assert other.status is SolveStatus.CONVERGED
-        assert np.any(solution.active)
-        np.testing.assert_allclose(solution.inputs, other.inputs, atol=1e-6)
-        np.testing.assert_allclose(solution.states, other.states, atol=1e-6)
+        share += float(np.mean(other.active != 0)) / len(programs)
+        for guess in (_guess(problem), other.active, _guess(problem, rng)):
+            solution = solver.solve(qp, guess)
+            assert solution.status is SolveStatus.CONVERGED
+            np.testing.assert_allclose(solution.inputs, other.inputs, atol=1e-6)
+            np.testing.assert_allclose(solution.states, other.states, atol=1e-6)
+    assert share > 0.3 if saturated else share < 0.3
 
 
 def test_a_guess_of_the_active_set_changes_the_work_and_not_the_answer(make_solver: MakeSolver) -> None:

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from uasfly.airframe import Airframe
 from uasfly.control.transcription import interval_function, linearisation_function
 from uasfly.messages import Array
-from uasfly.model import INPUTS, PARAMETERS, STATES, controller_dynamics, controller_parameters
+from uasfly.model import INPUTS, PARAMETERS, ROLL, STATES, controller_dynamics, controller_parameters
 
 
 def _random_point(rng: np.random.Generator) -> tuple[Array, Array, float, float]:
@@ -114,3 +114,15 @@ def test_entries_that_never_vary_do_not_travel() -> None:
     assert pattern.sparsity.nnz() == 43
     assert pattern.size == 40
     assert sorted(set(pattern.constants)) == [0.0, 1.0]
+
+
+def test_the_last_columns_of_a_packed_jacobian_are_those_of_the_dense_one() -> None:
+    """From roll on every entry varies; columns with ones in them are refused."""
+    _, pattern = linearisation_function()
+    packed = np.random.default_rng(9).normal(size=pattern.size)
+    symbol = ca.MX.sym("J", pattern.size)
+    columns = ca.Function("columns", [symbol], [ca.densify(pattern.last_columns(symbol, ROLL))])
+    a, b = pattern.dense(packed[None])
+    np.testing.assert_array_equal(np.asarray(columns(packed)), np.hstack((a[0], b[0]))[:, ROLL:])
+    with pytest.raises(ValueError, match="do not vary"):
+        pattern.last_columns(symbol, 0)

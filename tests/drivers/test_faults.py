@@ -28,7 +28,6 @@ def outcomes() -> dict[str, Outcome]:
     return {outcome.case.name: outcome for outcome in fly_table(list(CATALOGUE), SEED, lambda _: None)}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("case", CATALOGUE, ids=lambda case: case.name)
 def test_a_fault_ends_as_expected(case: FaultCase, outcomes: dict[str, Outcome]) -> None:
     """Words, reaction and distance as the catalogue says; every setpoint finite, in range and younger than 0.2 s."""

@@ -172,7 +172,6 @@ def flights(tmp_path_factory: pytest.TempPathFactory) -> dict[str, LiveFlight]:
         return {name: future.result() for name, future in futures.items()}
 
 
-@pytest.mark.slow
 def test_a_flight_over_mavlink_completes_and_leaves_nothing_behind(flights: dict[str, LiveFlight]) -> None:
     """Outcome, log and summary are whole; the vehicle has landed and its process is gone."""
     flight = flights["completed"]
@@ -198,7 +197,6 @@ def test_a_flight_over_mavlink_completes_and_leaves_nothing_behind(flights: dict
     assert not flight.messages(VehicleSample)[-1].armed
 
 
-@pytest.mark.slow
 def test_an_interrupt_in_the_legs_holds_and_lands(flights: dict[str, LiveFlight]) -> None:
     """Ctrl-C once: hold, land, aborted with the reason; log and summary are whole, nothing is left running."""
     flight = flights["interrupted"]
@@ -217,7 +215,6 @@ def test_an_interrupt_in_the_legs_holds_and_lands(flights: dict[str, LiveFlight]
     assert not flight.messages(VehicleSample)[-1].armed
 
 
-@pytest.mark.slow
 def test_a_killed_uasfly_leaves_its_log_and_no_vehicle(flights: dict[str, LiveFlight]) -> None:
     """SIGKILL in the legs: the log reads up to the last second, and the simulated vehicle's process goes by itself."""
     flight = flights["killed"]

@@ -100,7 +100,6 @@ def test_the_hand_over_is_bumpless(flown: tuple[dict[str, Any], Path]) -> None:
     assert np.all(steps[first - 1] <= steps[first + 50 :].max(axis=0))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("mission", "scenario", "limit_m"), [("hover", "blower_hover", 0.05)])
 def test_wind_is_held_twice_as_well_as_by_the_backup_pids(mission: str, scenario: str, limit_m: float) -> None:
     """The blower's whole programme: below the limit, and less than half of what the PIDs stray on the same seed."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import deque
 from functools import lru_cache
@@ -11,12 +12,13 @@ import numpy as np
 
 from uasfly import native
 from uasfly.airframe import GRAVITY_M_S2, ModelParameters
-from uasfly.control.buffered import BufferedFunction
+from uasfly.control.stagewise import Stagewise
 from uasfly.control.transcription import interval_function
 from uasfly.messages import Array, Setpoint
-from uasfly.model import PARAMETER_K_THRUST, PITCH, ROLL, STATES
+from uasfly.model import INPUTS, PARAMETER_K_THRUST, PARAMETERS, PITCH, ROLL, STATES
 
 LONGEST_PREDICTION_S = 0.5
+KEPT = 256  # setpoints
 
 
 @lru_cache(maxsize=1)
@@ -33,9 +35,17 @@ class DelayPredictor:
 
     def __init__(self, model: ModelParameters) -> None:
         self._model = model
-        self._interval = BufferedFunction(_compiled_interval())
+        # One row a piece of constant command; what one step ends with is what the next one starts from.
+        self._states, self._inputs = np.zeros((KEPT + 1, STATES)), np.zeros((KEPT, INPUTS))
+        self._parameters, self._yaw_rate = np.zeros(PARAMETERS), np.zeros(1)
+        self._yaws, self._durations = np.zeros((KEPT, 1)), np.zeros((KEPT, 1))
+        self._steps = Stagewise(
+            _compiled_interval(),
+            [self._states[:-1], self._inputs, self._parameters, self._yaws, self._yaw_rate, self._durations],
+            [self._states[1:]],
+        )
         # From when each setpoint acts [s]; the first one acts since ever, None where it is not known.
-        self._history: deque[tuple[float, Setpoint | None]] = deque(((-math.inf, None),), maxlen=256)
+        self._history: deque[tuple[float, Setpoint | None]] = deque(((-math.inf, None),), maxlen=KEPT)
 
     def reset(self, setpoint: Setpoint | None) -> None:
         """Forget what was sent; `setpoint` is what the vehicle was being told so far, if that is known."""
@@ -63,18 +73,25 @@ class DelayPredictor:
         history = self._history
         while len(history) > 1 and history[1][0] <= from_s:
             history.popleft()
-        arguments, at = self._interval.arguments, from_s
-        arguments[0][:], arguments[2][:], arguments[4][0] = state, parameters, yaw_rate_rad_s
-        for index, (_, setpoint) in enumerate(history):
-            end = min(history[index + 1][0], to_s) if index + 1 < len(history) else to_s
+        at, ends = from_s, itertools.chain((start_s for start_s, _ in itertools.islice(history, 1, None)), (to_s,))
+        inputs: list[tuple[float, float, float]] = []
+        yaws: list[float] = []
+        durations: list[float] = []
+        for (_, setpoint), next_s in zip(history, ends, strict=True):
+            end = min(next_s, to_s)
             if end <= at:
                 continue
-            arguments[1][:] = self._unknown_inputs(state, parameters) if setpoint is None else inputs_of(setpoint)
-            arguments[3][0], arguments[5][0] = yaw_rad + yaw_rate_rad_s * (at - from_s), end - at
-            self._interval.call()
-            arguments[0][:] = self._interval.results[0]
+            inputs.append(self._unknown_inputs(state, parameters) if setpoint is None else inputs_of(setpoint))
+            yaws.append(yaw_rad + yaw_rate_rad_s * (at - from_s))
+            durations.append(end - at)
             at = end
-        return arguments[0].copy(), yaw_rad + yaw_rate_rad_s * max(to_s - from_s, 0.0)
+        count = len(inputs)
+        self._states[0], self._parameters[:], self._yaw_rate[0] = state, parameters, yaw_rate_rad_s
+        if count:
+            self._inputs[:count], self._yaws[:count, 0], self._durations[:count, 0] = inputs, yaws, durations
+            for step in self._steps.calls[:count]:
+                step()
+        return self._states[count].copy(), yaw_rad + yaw_rate_rad_s * max(to_s - from_s, 0.0)
 
     def _unknown_inputs(self, state: Array, parameters: Array) -> tuple[float, float, float]:
         """Thrust, roll and pitch command (3,) that keep attitude and height: the guess where nothing is known."""

@@ -92,11 +92,11 @@ class QpOptions:
         final_gap: at which it ends. loose_gap: up to which an unfinished result still counts as INEXACT.
     """
 
-    active_set_sweeps: int = 5
+    active_set_sweeps: int = 8
     interior_iterations: int = 50
-    polish_sweeps: int = 3
+    polish_sweeps: int = 5
     bound_tolerance: float = 1e-9
-    start_barrier: float = 1e3
+    start_barrier: float = 10.0
     early_gap: float = 1e-3
     final_gap: float = 1e-11
     loose_gap: float = 1e-5

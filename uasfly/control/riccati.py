@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from uasfly.control.transcription import JacobianPattern
-from uasfly.model import INPUTS, STATES
+from uasfly.model import INPUTS, ROLL, STATES
 
 PACKED = STATES * (STATES + 1) // 2  # upper triangle of P, by columns
 PACKED_INPUTS = INPUTS * (INPUTS + 1) // 2
@@ -28,8 +28,9 @@ class StageFunctions:
     """The stage of each sweep; what is carried from stage to stage comes first in arguments and results.
 
     Attributes:
-        backward: (P, p, J, c, q, r, Q, R, free, fixed) -> (P, p, K, k, Hux, Huu, hu); where free = 0, du = fixed.
-        forward: (dx, J, c, K, k, Hux, Huu, hu, free, fixed) -> (dx+, du, gradient of the cost by du).
+        backward: (P, p, J, c, q, r, Q, R, free, fixed) -> (P, p, K, k, Hux, Huu, hu); where free = 0,
+            du = fixed; elsewhere fixed = 0.
+        forward: (dx, J, c, K, k, Hux, Huu, hu, fixed) -> (dx+, du, gradient of the cost by du).
         barrier_backward: (P, p, J, c, q, r, Q, R) -> (P, p, K, k, factor, P c), every input free.
         barrier_vector: (p, J, P c, q, r, K, factor) -> (p, k), again with other q, r and the same factor.
         barrier_forward: (dx, J, c, K, k) -> (dx+, du).
@@ -104,8 +105,14 @@ class _Factor:
         return ca.vertcat(*rows)
 
 
-def stage_functions(pattern: JacobianPattern) -> StageFunctions:
-    """The stage functions for a Jacobian pattern."""
+def stage_functions(pattern: JacobianPattern, *, products_given: bool = False) -> StageFunctions:
+    """The stage functions for a Jacobian pattern.
+
+    Args:
+        pattern: of [A B].
+        products_given: whether `backward` and `barrier_backward` take two products of P before all other arguments, for
+            callers that have them cheaper: with the last columns of [A B] from roll on (8 rows), and with c + B fixed.
+    """
     symbol = ca.SX.sym
     cost, slope, packed, defect = (
         symbol("P", PACKED),
@@ -121,13 +128,14 @@ def stage_functions(pattern: JacobianPattern) -> StageFunctions:
     a, b = jacobian[:, :STATES], jacobian[:, STATES:]
 
     hessian = _symmetric(cost, STATES)
-    carried = hessian @ jacobian
-    cost_of_defect = hessian @ defect
-    ahead = cost_of_defect + slope
-    h_xx = ca.diag(weight_x) + a.T @ carried[:, :STATES]
-    h_ux = b.T @ carried[:, :STATES]
-    h_uu = ca.diag(weight_u) + b.T @ carried[:, STATES:]
-    h_u, h_x = r + b.T @ ahead, q + a.T @ ahead
+    carried, cost_of_defect = hessian @ jacobian[:, ROLL:], hessian @ defect
+    cost_of_held = hessian @ (defect + b @ fixed)
+    given: list[ca.SX] = []
+    if products_given:
+        carried, cost_of_defect = symbol("PJ", *carried.shape), symbol("Pd", STATES)
+        given, cost_of_held = [carried, cost_of_defect], cost_of_defect
+    carried_x, carried_u = ca.horzcat(hessian @ a[:, :ROLL], carried[:, : STATES - ROLL]), carried[:, STATES - ROLL :]
+    h_xx, h_ux, h_uu = ca.diag(weight_x) + a.T @ carried_x, carried_u.T @ a, ca.diag(weight_u) + b.T @ carried_u
 
     def eliminate(uu: ca.SX, ux: ca.SX, u: ca.SX, x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, _Factor]:
         factor = _Factor.of(uu)
@@ -138,20 +146,21 @@ def stage_functions(pattern: JacobianPattern) -> StageFunctions:
         next_slope = x - half[:, :STATES].T @ scaled[:, STATES]
         return upper_triangle(next_cost), next_slope, ca.vec(gains[:, :STATES]), gains[:, STATES], factor
 
-    # A held input gets a row of the identity and no right hand side: gain and feed-forward come out zero.
-    held = (1.0 - free) * fixed
+    # A held input is part of the defect; it gets a row of the identity and no right hand side, so that gain and
+    # feed-forward come out zero.
     masked = ca.SX(INPUTS, INPUTS)
     for i in range(INPUTS):
         for k in range(INPUTS):
             masked[i, k] = free[i] * free[k] * h_uu[i, k] if i != k else free[i] * h_uu[i, i] + (1.0 - free[i])
-    p_next, s_next, big_k, small_k, _ = eliminate(
-        masked, ca.diag(free) @ h_ux, free * (h_u + h_uu @ held), h_x + h_ux.T @ held
-    )
-    arguments = [cost, slope, packed, defect, q, r, weight_x, weight_u]
+    ahead = cost_of_held + slope
+    h_u = r + weight_u * fixed + b.T @ ahead
+    p_next, s_next, big_k, small_k, _ = eliminate(masked, ca.diag(free) @ h_ux, free * h_u, q + a.T @ ahead)
+    arguments = [*given, cost, slope, packed, defect, q, r, weight_x, weight_u]
     results = [p_next, s_next, big_k, small_k, ca.vec(h_ux), upper_triangle(h_uu), h_u]
     backward = _function("uasfly_backward", [*arguments, free, fixed], results)
 
-    p_next, s_next, big_k, small_k, factor = eliminate(h_uu, h_ux, h_u, h_x)
+    ahead = cost_of_defect + slope
+    p_next, s_next, big_k, small_k, factor = eliminate(h_uu, h_ux, r + b.T @ ahead, q + a.T @ ahead)
     results = [p_next, s_next, big_k, small_k, factor.packed(), cost_of_defect]
     barrier_backward = _function("uasfly_barrier_backward", arguments, results)
 
@@ -167,11 +176,11 @@ def stage_functions(pattern: JacobianPattern) -> StageFunctions:
 
     ux_vector, uu_vector, u_vector = symbol("Hux", INPUTS * STATES), symbol("Huu", PACKED_INPUTS), symbol("hu", INPUTS)
     step = -(gain @ dx) - feedforward
-    inputs = step + (1.0 - free) * fixed
-    gradient = u_vector + ca.reshape(ux_vector, INPUTS, STATES) @ dx + _symmetric(uu_vector, INPUTS) @ inputs
+    inputs = step + fixed
+    gradient = u_vector + ca.reshape(ux_vector, INPUTS, STATES) @ dx + _symmetric(uu_vector, INPUTS) @ step
     forward = _function(
         "uasfly_forward",
-        [dx, packed, defect, gain_vector, feedforward, ux_vector, uu_vector, u_vector, free, fixed],
+        [dx, packed, defect, gain_vector, feedforward, ux_vector, uu_vector, u_vector, fixed],
         [a @ dx + b @ inputs + defect, inputs, gradient],
     )
     barrier_forward = _function(

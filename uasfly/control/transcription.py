@@ -10,10 +10,13 @@ import numpy as np
 from uasfly.messages import Array
 from uasfly.model import (
     INPUTS,
+    PARAMETER_DRAG,
     PARAMETER_FORCE,
     PARAMETERS,
+    POSITION,
     ROLL,
     STATES,
+    VELOCITY,
     attitude_response,
     controller_dynamics,
 )
@@ -25,22 +28,30 @@ def interval_end(state: ca.SX, inputs: ca.SX, parameters: ca.SX, yaw: ca.SX, yaw
     Roll and pitch follow eq. 2 exactly; position and velocity take one Runge-Kutta step of order four along that
     attitude. The grid's late intervals are longer than the attitude's time constant: there a Runge-Kutta step of the
     attitude itself would be wrong by half the step, and beyond 2.8 time constants unstable.
+
+    Along a given attitude the motion is linear, p' = v and v' = a - drag v, so that step is a sum of the velocity and
+    of the accelerations a at start, middle and end. Its coefficients, polynomials in z = -drag h, are written out: code
+    generated from the stages k1..k4 and their derivatives does a third more.
     """
-    motion = state[:ROLL]
-    half = 0.5 * interval
+    half, at_rest = 0.5 * interval, ca.SX.zeros(ROLL)
     attitude_start = state[ROLL:]
     attitude_middle = attitude_response(state, inputs, parameters, half)
-    attitude_end = attitude_response(ca.vertcat(motion, attitude_middle), inputs, parameters, half)
+    attitude_end = attitude_response(ca.vertcat(at_rest, attitude_middle), inputs, parameters, half)
 
-    def slope(at: ca.SX, attitude: ca.SX, yaw_then: ca.SX) -> ca.SX:
-        return controller_dynamics(ca.vertcat(at, attitude), inputs, parameters, yaw_then)[:ROLL]
+    def acceleration(attitude: ca.SX, yaw_then: ca.SX) -> ca.SX:
+        return controller_dynamics(ca.vertcat(at_rest, attitude), inputs, parameters, yaw_then)[VELOCITY]
 
-    yaw_middle, yaw_end = yaw + half * yaw_rate, yaw + interval * yaw_rate
-    k1 = slope(motion, attitude_start, yaw)
-    k2 = slope(motion + half * k1, attitude_middle, yaw_middle)
-    k3 = slope(motion + half * k2, attitude_middle, yaw_middle)
-    k4 = slope(motion + interval * k3, attitude_end, yaw_end)
-    return ca.vertcat(motion + interval / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), attitude_end)
+    start = acceleration(attitude_start, yaw)
+    middle = acceleration(attitude_middle, yaw + half * yaw_rate)
+    end = acceleration(attitude_end, yaw + interval * yaw_rate)
+    velocity, z = state[VELOCITY], -interval * parameters[PARAMETER_DRAG]
+    decay = 1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0))
+    of_start, of_middle = 1.0 + z / 2.0 * (1.0 + z / 2.0), 2.0 + z / 2.0
+    sixth, square = interval / 6.0, interval**2 / 6.0
+    moved = (interval * decay) * velocity + (square * of_start) * start + (square * of_middle) * middle
+    kept = (1.0 + z * decay) * velocity
+    gained = (sixth * (1.0 + z * of_start)) * start + (sixth * (4.0 + z * of_middle)) * middle + sixth * end
+    return ca.vertcat(state[POSITION] + moved, kept + gained, attitude_end)
 
 
 def with_force(parameters: ca.SX, force: ca.SX) -> ca.SX:
@@ -83,6 +94,20 @@ class JacobianPattern:
         for place, index in enumerate(self.varying):
             entries[index] = packed[place]
         return ca.SX(self.sparsity, ca.vertcat(*entries))
+
+    def last_columns(self, packed: ca.MX, first: int) -> ca.MX:
+        """Columns of [A B] from `first` on, of a packed vector; a product with them skips the zeros.
+
+        Raises:
+            ValueError: where one of their entries does not vary.
+        """
+        before = self.sparsity.colind()[first]
+        count = self.sparsity.nnz() - before
+        if self.varying[-count:] != tuple(range(before, before + count)):
+            raise ValueError(f"columns from {first} on have entries that do not vary")
+        places = [index - before for index in self.sparsity.colind()[first:]]
+        columns = ca.Sparsity(STATES, STATES + INPUTS - first, places, self.sparsity.row()[before:])
+        return ca.MX(columns, packed[packed.numel() - count :])
 
     def dense(self, packed: Array) -> tuple[Array, Array]:
         """Matrices A (N, 8, 8) and B (N, 8, 3) of packed vectors (N, size)."""

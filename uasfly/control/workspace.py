@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -27,21 +28,34 @@ class Workspace:
 
     def __init__(self, problem: Problem) -> None:
         nodes = problem.grid.nodes
-        self.parameters: Array = np.zeros(PARAMETERS)
-        self.force: Array = np.zeros((nodes, 3))
-        self.yaw: Array = np.zeros(nodes + 1)
-        self.initial: Array = np.zeros(STATES)
-        self.position: Array = np.zeros((nodes + 1, 3))
-        self.velocity: Array = np.zeros((nodes + 1, 3))
-        self.acceleration: Array = np.zeros((nodes + 1, 3))
+        points = (nodes + 1, 3)
+        # What is handed in and what is computed from it lie in a block each, which is checked in one go.
+        self._given, views = _block((PARAMETERS,), (nodes, 3), (nodes + 1,), (STATES,), points, points, points)
+        self.parameters, self.force, self.yaw, self.initial, self.position, self.velocity, self.acceleration = views
+        self._references, views = _block((nodes + 1, STATES), (nodes, INPUTS))
+        self.state_reference, self.input_reference = views
         tilt = float(np.min(np.abs((problem.input_lower[1:], problem.input_upper[1:]))))
         self.limits: Array = np.array((tilt, problem.input_lower[0], problem.input_upper[0]))
-        self.state_reference: Array = np.zeros((nodes + 1, STATES))
-        self.input_reference: Array = np.zeros((nodes, INPUTS))
         self.states: Array = np.zeros((nodes + 1, STATES))
         self.inputs: Array = np.zeros((nodes, INPUTS))
         self.active: Active = np.zeros((nodes, INPUTS), np.int8)
         self.figures: Array = np.zeros(4)
+
+    def given_is_finite(self) -> bool:
+        """Whether all data of a solve are."""
+        return math.isfinite(np.add.reduce(self._given))
+
+    def references_are_finite(self) -> bool:
+        """Whether the references for states and inputs are."""
+        return math.isfinite(np.add.reduce(self._references))
+
+
+def _block(*shapes: tuple[int, ...]) -> tuple[Array, list[Array]]:
+    """Memory for arrays of several shapes, and the arrays."""
+    sizes = [math.prod(shape) for shape in shapes]
+    memory = np.zeros(sum(sizes))
+    parts = np.split(memory, np.cumsum(sizes)[:-1])
+    return memory, [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
 
 
 class Backend(Protocol):

@@ -36,13 +36,13 @@ class _SquareSum:
     largest_square: float = 0.0
 
     def add(self, error: Array) -> None:
-        x, y, z = error.tolist()
-        x, y, z = x * x, y * y, z * z
+        x, y, z = (error * error).tolist()
         self.count += 1
         self.x += x
         self.y += y
         self.z += z
-        self.largest_square = max(self.largest_square, x + y + z)
+        square = x + y + z
+        self.largest_square = max(self.largest_square, square)
 
     @property
     def largest(self) -> float:

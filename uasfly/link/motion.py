@@ -18,6 +18,7 @@ Fields = Mapping[str, Any]
 
 FRAME_LOCAL_NED = 1  # MAV_FRAME
 NORM_TOLERANCE = 0.01
+_ODOMETRY = ("x", "y", "z", "vx", "vy", "vz", "rollspeed", "pitchspeed", "yawspeed")
 CELL_UNKNOWN_MV = 65535
 
 
@@ -25,12 +26,12 @@ def odometry_sample(fields: Fields, time_s: float) -> OdometrySample | None:
     """ODOMETRY in the frame LOCAL_NED; the velocity is in the child frame: LOCAL_NED as PX4 sends it, else body FRD."""
     if fields["frame_id"] != FRAME_LOCAL_NED:
         return None
-    position = _vector(fields, "x", "y", "z")
-    velocity = _vector(fields, "vx", "vy", "vz")
-    rate = _vector(fields, "rollspeed", "pitchspeed", "yawspeed")
+    numbers = [fields[name] for name in _ODOMETRY]
     quaternion = unit_quaternion(fields["q"])
-    if position is None or velocity is None or rate is None or quaternion is None:
+    if quaternion is None or None in numbers or not math.isfinite(sum(numbers)):
         return None
+    motion = np.array(numbers, dtype=np.float64)
+    position, velocity, rate = motion[0:3], motion[3:6], motion[6:9]
     if fields["child_frame_id"] != FRAME_LOCAL_NED:
         velocity = rotation_matrix(quaternion) @ velocity
     return OdometrySample(
@@ -69,11 +70,6 @@ def unit_quaternion(values: Any) -> Array | None:
     w, x, y, z = values
     norm = math.sqrt(w * w + x * x + y * y + z * z)
     return np.array((w / norm, x / norm, y / norm, z / norm)) if abs(norm - 1.0) < NORM_TOLERANCE else None
-
-
-def _vector(fields: Fields, *names: str) -> Array | None:
-    values = [fields[name] for name in names]
-    return None if None in values else finite(values)
 
 
 def finite(values: Any) -> Array | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from operator import mul
 
 import numpy as np
 
@@ -47,9 +48,7 @@ class Odometry:
 
 def plausible(values: list[float], largest_squared: float = _LARGEST_SQUARED) -> bool:
     """Whether every number is finite and none is absurdly large."""
-    total = 0.0
-    for value in values:
-        total += value * value
+    total: float = sum(map(mul, values, values))
     return total < largest_squared  # False for NaN
 
 

@@ -41,7 +41,7 @@ class Moment:
     @property
     def layout(self) -> s.Layout:
         """How `packed` is laid out."""
-        return s.Layout(len(self.markers))
+        return s.layout(len(self.markers))
 
     @property
     def variances(self) -> tuple[list[float], list[float]]:

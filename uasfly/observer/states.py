@@ -6,7 +6,7 @@ The error is local (body side) in every rotation: q = q_nominal * exp(d_attitude
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import lru_cache
 
 # Nominal state.
 POSITION = slice(0, 3)  # m, world
@@ -46,52 +46,34 @@ def marker_error(index: int) -> slice:
     return slice(start, start + MARKER_ERROR)
 
 
-@dataclass(frozen=True, slots=True)
 class Layout:
     """The packed filter state of `markers` markers: all that one step of the filter hands to the next.
 
-    Nominal state, covariance (symmetric, n x n), matched measurement covariances (three 3 x 3, in the order of
-    SENSORS), mean innovations (three of 3).
+    Attributes:
+        markers: how many.
+        nominal_size: length of the nominal state. errors: length n of the error state.
+        nominal: the nominal state. covariance: of the error, symmetric, n x n.
+        matched: matched measurement covariances, three 3 x 3, in the order of SENSORS.
+        mean: mean innovations, three of 3. size: length of the whole.
     """
 
-    markers: int
+    __slots__ = ("covariance", "errors", "markers", "matched", "mean", "nominal", "nominal_size", "size")
 
-    @property
-    def nominal_size(self) -> int:
-        """Length of the nominal state."""
-        return CORE_NOMINAL + MARKER_NOMINAL * self.markers
+    def __init__(self, markers: int) -> None:
+        self.markers = markers
+        self.nominal_size = CORE_NOMINAL + MARKER_NOMINAL * markers
+        self.errors = CORE_ERROR + MARKER_ERROR * markers
+        self.nominal = slice(0, self.nominal_size)
+        self.covariance = slice(self.nominal_size, self.nominal_size + self.errors * self.errors)
+        self.matched = slice(self.covariance.stop, self.covariance.stop + 9 * len(SENSORS))
+        self.mean = slice(self.matched.stop, self.matched.stop + 3 * len(SENSORS))
+        self.size: int = self.mean.stop
 
-    @property
-    def errors(self) -> int:
-        """Length n of the error state."""
-        return CORE_ERROR + MARKER_ERROR * self.markers
 
-    @property
-    def nominal(self) -> slice:
-        """The nominal state."""
-        return slice(0, self.nominal_size)
-
-    @property
-    def covariance(self) -> slice:
-        """The covariance of the error."""
-        return slice(self.nominal_size, self.nominal_size + self.errors * self.errors)
-
-    @property
-    def matched(self) -> slice:
-        """Matched covariances of the odometry's sensors."""
-        start = self.nominal_size + self.errors * self.errors
-        return slice(start, start + 9 * len(SENSORS))
-
-    @property
-    def mean(self) -> slice:
-        """Mean innovations of the odometry's sensors."""
-        start = self.matched.stop
-        return slice(start, start + 3 * len(SENSORS))
-
-    @property
-    def size(self) -> int:
-        """Length of the whole."""
-        return self.nominal_size + self.errors * self.errors + 12 * len(SENSORS)
+@lru_cache(maxsize=16)
+def layout(markers: int) -> Layout:
+    """The layout for so many markers."""
+    return Layout(markers)
 
 
 # Input of a prediction.

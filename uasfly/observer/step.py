@@ -175,11 +175,13 @@ class Stepper:
         )
         result = np.empty(packed.size)
         self._odometry_steps[len(before.markers)]((packed, inputs), (result, self._outputs))
-        values = self._outputs.tolist()
+        nis, accepted = self._outputs[s.OUT_NIS].tolist(), self._outputs[s.OUT_ACCEPTED].tolist()
         verdicts = tuple(
-            Verdict(name, values[k], s.SENSOR_DOF, values[k + 3] > 0.5)
-            for k, name in enumerate(s.SENSORS)
-            if odometry.use[k]
+            [
+                Verdict(name, value, s.SENSOR_DOF, taken > 0.5)
+                for name, value, taken, used in zip(s.SENSORS, nis, accepted, odometry.use, strict=True)
+                if used
+            ]
         )
         moment = Moment(
             time_s,
@@ -197,8 +199,12 @@ class Stepper:
 
     def _factors(self, interval_s: float, velocity_factor: float) -> tuple[float, ...]:
         """Factors on the variances of attitude, position and velocity."""
-        attitude, position, velocity = (correlation_factor(interval_s, time_s) for time_s in self._correlations_s)
-        return attitude, position, velocity * velocity_factor
+        attitude_s, position_s, velocity_s = self._correlations_s
+        return (
+            correlation_factor(interval_s, attitude_s),
+            correlation_factor(interval_s, position_s),
+            correlation_factor(interval_s, velocity_s) * velocity_factor,
+        )
 
     def _sighting(self, moment: Moment, sighting: Sighting) -> tuple[Moment, tuple[Verdict, ...]]:
         """The moment after the sighting; `moment` is already predicted to its time."""

@@ -84,6 +84,8 @@ class Pacing:
     def _scalars_at(self, clock_s: float) -> tuple[float, float]:
         """Mission time and pace at one time of the clock."""
         elapsed = clock_s - self._clock_s
+        if self._from == self._to:
+            return self._mission_s + self._from * elapsed, self._from
         u = min(max(elapsed / CHANGE_S, 0.0), 1.0)
         change = self._to - self._from
         gone = CHANGE_S * u**3 * (1.0 - 0.5 * u) + max(elapsed - CHANGE_S, 0.0)

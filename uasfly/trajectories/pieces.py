@@ -142,7 +142,7 @@ class PieceTable:
         time_s = min(max(time_s, 0.0), self.duration_s)
         piece = bisect_right(self._start_list, time_s) - 1
         t = time_s - self._start_list[piece]
-        x, y, z, phase = (((d * t + c) * t + b) * t + a for a, b, c, d in self._coefficients[piece])
+        x, y, z, phase = [((d * t + c) * t + b) * t + a for a, b, c, d in self._coefficients[piece]]
         group = self._group_list[piece]
         if self._harmonics[group]:
             cosine, sine = math.cos(phase), math.sin(phase)

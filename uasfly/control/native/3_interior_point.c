@@ -3,6 +3,7 @@
 
 #define SHORT_STEP 0.1    /* a corrected step below this is tried again with plain centring */
 #define TO_BOUNDARY 0.995 /* share of the way to the boundary */
+#define START_MARGIN 0.1  /* share of the range that the first point keeps from its bounds */
 
 #define EACH_INPUT(s) \
   for (stage_t *s = stages; s < stages + problem->nodes; s++) \
@@ -16,19 +17,23 @@ typedef struct {
   double residual; /* what is left of the first dual residual, as a share */
 } interior_t;
 
+/* Starts from what the active set came to last: its inputs moved inside, its gradients as multipliers. */
 static interior_t start_inside(const problem_t *problem, stage_t *stages) {
-  interior_t run = {0, 0.0, problem->start_barrier, 1.0};
+  double count = 2.0 * problem->nodes * NU, total = 0.0;
+  interior_t run = {0, 0.0, 0.0, 1.0};
   EACH_INPUT(s) {
-    double range = s->upper[i] - s->lower[i], margin = 0.1 * range;
+    double range = s->upper[i] - s->lower[i], margin = START_MARGIN * range;
     double size = problem->input_weight[(s - stages) * NU + i] * range * range;
-    s->point[i] = fmin(fmax(0.0, s->lower[i] + margin), s->upper[i] - margin);
+    s->point[i] = fmin(fmax(s->du[i], s->lower[i] + margin), s->upper[i] - margin);
     /* Slacks are kept, not computed from the point: near a bound the difference would lose all its digits. */
     s->low[i] = s->point[i] - s->lower[i];
     s->high[i] = s->upper[i] - s->point[i];
-    s->z_lower[i] = problem->start_barrier * size / s->low[i];
-    s->z_upper[i] = problem->start_barrier * size / s->high[i];
-    run.scale += size / (problem->nodes * NU);
+    s->z_lower[i] = problem->start_barrier * size / s->low[i] + fmax(s->gradient[i], 0.0);
+    s->z_upper[i] = problem->start_barrier * size / s->high[i] + fmax(-s->gradient[i], 0.0);
+    total += s->low[i] * s->z_lower[i] + s->high[i] * s->z_upper[i];
+    run.scale += 2.0 * size / count;
   }
+  run.gap = total / count / run.scale;
   return run;
 }
 

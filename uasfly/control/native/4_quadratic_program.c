@@ -16,6 +16,7 @@ static int solve_quadratic_program(const problem_t *problem, stage_t *stages, do
   int sweeps = 0, status = CONVERGED, nodes = problem->nodes;
   double sum = 0.0;
   interior_t run = {0, 0.0, 0.0, 0.0};
+  EACH_INPUT(s) s->du[i] = s->gradient[i] = 0.0; /* where the options leave no sweep */
   if (active_set(problem, stages, problem->active_set_sweeps, &sweeps) > 0) {
     const double tolerances[2] = {problem->early_gap, problem->final_gap};
     int changes = 1;

@@ -19,7 +19,7 @@ class UncertainEstimate:
     def __call__(self, watched: Watched) -> str:
         """What is wrong with it."""
         settings, diagnosis = self._settings, watched.diagnosis
-        position, velocity = float(diagnosis.position_sigma_m.max()), float(diagnosis.velocity_sigma_m_s.max())
+        position, velocity = max(diagnosis.position_sigma_m.tolist()), max(diagnosis.velocity_sigma_m_s.tolist())
         if not position <= settings.position_sigma_m:
             return f"position known to {position:.2f} m only"
         if not velocity <= settings.velocity_sigma_m_s:
@@ -40,10 +40,9 @@ def not_finite(watched: Watched) -> str:
 
 
 def _is_finite(estimate: StateEstimate) -> bool:
-    total = (
-        float(estimate.position_in_world.sum())
-        + float(estimate.velocity_in_world.sum())
-        + float(estimate.quaternion_body_to_world.sum())
-        + float(estimate.force_in_world.sum())
+    return math.isfinite(
+        sum(estimate.position_in_world.tolist())
+        + sum(estimate.velocity_in_world.tolist())
+        + sum(estimate.quaternion_body_to_world.tolist())
+        + sum(estimate.force_in_world.tolist())
     )
-    return math.isfinite(total)

@@ -84,7 +84,7 @@ class Watch:
 
     def check(self, watched: Watched) -> Alarm | None:
         """The alarm that lasts, the same object as long as its action does."""
-        text = self._find(watched) if watched.flying or not self._flying_only else ""
+        text = "" if self._flying_only and not watched.flying else self._find(watched)
         if not text and self._lasting.idle:  # nearly always
             return None
         action = self._lasting.update(watched.time_s, bool(text))
