@@ -14,6 +14,7 @@ from uasfly.trajectories.glide import Glide, glide_time_s
 from uasfly.trajectories.hold import HoldTrajectory
 from uasfly.trajectories.mission_trajectory import MissionTrajectory
 from uasfly.trajectories.pacing import Pacing
+from uasfly.trajectories.placement import Placement
 from uasfly.trajectories.trajectory import TrajectoryError
 
 HOLD_RADIUS_M = 0.2  # while the vehicle engages, the point to hold at follows it beyond this distance
@@ -182,7 +183,7 @@ class Course:
                 self._limits,
                 start_position=self._hold.position_in_world,
                 start_yaw=self._hold.yaw_rad,
-                takeoff_in_world=self.origin,
+                placement=Placement(self.origin),
             )
         except TrajectoryError as error:
             self.problem = f"the mission cannot be flown from here: {error}"
