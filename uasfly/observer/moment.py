@@ -61,9 +61,14 @@ class Moment:
 
 @dataclass(slots=True)
 class Verdict:
-    """What the gate said of one sensor: normalised innovation squared, degrees of freedom, accepted or not."""
+    """What the gate said of one sensor: normalised innovation squared, degrees of freedom, accepted or not.
+
+    A sighting also says how far away [m] and how turned [rad] the marker is against where the filter has it.
+    """
 
     sensor: str
     nis: float
     dof: int
     accepted: bool
+    away_m: float = 0.0
+    turned_rad: float = 0.0
