@@ -6,7 +6,7 @@ The same step serves the live flight, the rehearsal and the replay of a log: sam
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,12 +16,12 @@ from uasfly.control.controller import Controller, ControlResult
 from uasfly.flight.choices import EndingAction, Engage
 from uasfly.flight.clearance import Clearance
 from uasfly.flight.course import Course
+from uasfly.flight.echo import echo, told
 from uasfly.flight.monitors import Monitors, Watched
 from uasfly.flight.preflight import Preflight, announcements, as_pilot_flies, stop_reason
 from uasfly.flight.response import Response
 from uasfly.flight.sequencer import Sequencer
 from uasfly.flight.view import VehicleView
-from uasfly.frames import euler_from_quaternion
 from uasfly.messages import (
     Action,
     Alarm,
@@ -40,7 +40,6 @@ from uasfly.observer.diagnosis import Diagnosis
 from uasfly.observer.observer import Observer
 from uasfly.preflight_messages import PreflightCheck
 
-TARGET_FRESH_S = 0.5  # an older attitude target is not what the vehicle is being told
 _ENDINGS = {Action.END: None, Action.RETURN: EndingAction.RETURN, Action.LAND: EndingAction.LAND}
 
 
@@ -155,10 +154,10 @@ class Pilot:
             alarms = self._watch(time_s, estimate, authority)
             self._respond(time_s, estimate, alarms)
         if sequencer.streaming and estimate is not None:
-            setpoint = None if sequencer.in_offboard else self._echo(time_s)
+            setpoint = None if sequencer.in_offboard else echo(self.view, time_s, self.airframe.limits)
             if setpoint is None:
                 if not self._streamed:
-                    self.controller.reset(time_s, self._told(time_s))
+                    self.controller.reset(time_s, told(self.view, time_s))
                 control = self.controller.step(time_s, estimate, self.reference_at, self.view.voltage_v)
                 setpoint = control.setpoint
                 if control.text:
@@ -280,30 +279,6 @@ class Pilot:
             if place is not None:
                 return place
         return otherwise
-
-    def _told(self, time_s: float) -> Setpoint | None:
-        """What PX4's attitude controller is being asked for, None where that is not known freshly."""
-        target = self.view.attitude_target
-        if target is None or abs(time_s - target.time_s) > TARGET_FRESH_S:
-            return None
-        roll, pitch, yaw = euler_from_quaternion(target.quaternion_body_to_world)
-        if not math.isfinite(roll + pitch + yaw + target.thrust):
-            return None
-        return Setpoint(target.time_s, roll, pitch, yaw, 0.0, target.thrust)
-
-    def _echo(self, time_s: float) -> Setpoint | None:
-        """Until PX4 is in offboard: what it is being told anyway, within the limits, so that the switch is no bump."""
-        told = self._told(time_s)
-        if told is None:
-            return None
-        limits = self.airframe.limits
-        return replace(
-            told,
-            time_s=time_s,
-            roll_rad=min(max(told.roll_rad, -limits.tilt_rad), limits.tilt_rad),
-            pitch_rad=min(max(told.pitch_rad, -limits.tilt_rad), limits.tilt_rad),
-            thrust=min(max(told.thrust, limits.thrust_min), limits.thrust_max),
-        )
 
     def _origin_of(self, estimate: StateEstimate) -> Array:
         if self.mission.frame == "local":
