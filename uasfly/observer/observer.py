@@ -189,6 +189,12 @@ class Observer:
         else:
             self._stepper.distrusted.add(marker_id)
 
+    def forget(self, marker_id: int) -> None:
+        """Take a marker out of the filter: its next sighting is the first."""
+        if self._timeline is not None:
+            self._timeline.forget(marker_id)
+        self._sightings.forget(marker_id)
+
     @property
     def moment(self) -> Moment | None:
         """The filter where it stands (nominal state, markers, time); None before the first odometry sample."""

@@ -68,6 +68,10 @@ class SightingLog:
             entries = self._entries[marker_id] = deque(maxlen=KEPT)
         entries.append((time_s, verdict))
 
+    def forget(self, marker_id: int) -> None:
+        """Begin anew."""
+        self._entries.pop(marker_id, None)
+
     def contradiction(self, marker_id: int, time_s: float) -> Contradiction:
         """What they say at a time."""
         recent = [v for t, v in self._entries.get(marker_id, ()) if time_s - t <= KEPT_S]
