@@ -135,12 +135,14 @@ def test_until_it_is_seen_it_holds_in_offboard_and_then_flies() -> None:
     assert any("waiting for the marker: holding" in text for text in flight.texts)
     status = flight.steps[-1].status
     assert (status.leg, status.leg_started, math.isnan(status.marker_age_s)) == (-1, False, True)
+    assert status.waits_for == "the marker"
     np.testing.assert_allclose(flight.spotter.position, GROUND + AIRBORNE)
     flight.spotter.seen = True
     flight.run(0.4)
     np.testing.assert_allclose(flight.spotter.position, GROUND + AIRBORNE)  # not long enough yet
     flight.run(0.3)
     assert flight.pilot.course.begun
+    assert flight.steps[-1].status.waits_for == ""
     flight.until(Phase.ENDING)
     np.testing.assert_allclose(flight.spotter.position, STANDOFF, atol=0.01)
     assert_smooth(flight.trace())
