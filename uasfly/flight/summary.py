@@ -72,7 +72,8 @@ class MarkerDatum:
         """A true position (3,) [m, world] as it lies in the filter's world: the same as seen from the marker."""
         x, y, z = (position - self.true_position).tolist()
         c, s = math.cos(self.turn_rad), math.sin(self.turn_rad)
-        return self.estimated_position + np.array((c * x - s * y, s * x + c * y, z))
+        placed: Array = self.estimated_position + np.array((c * x - s * y, s * x + c * y, z))
+        return placed
 
 
 @dataclass(slots=True)
