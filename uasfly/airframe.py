@@ -143,7 +143,7 @@ class ObserverNoise(FileModel):
     force_density: Annotated[Positive, Field(description="[m/s^2/sqrt(s)] random walk of the wind force")]
     gnss_bias_density: Annotated[Positive, Field(description="[m/sqrt(s)] random walk of the GNSS bias")]
     velocity_wander_density: Annotated[
-        Positive,
+        NonNegative,
         Field(description="[m/sqrt(s)] how the integral of PX4's velocity walks away from a marker that is seen"),
     ] = 0.02
     position_sigma_m: Positive

@@ -367,6 +367,7 @@ class Status:
         alarms: what the monitors find now. action: the highest of theirs, which is being done.
         pace: rate at which the mission's own time runs: 1 as planned, 0 held, negative on the way back.
         pilot_flies: the mission waits, because somebody else has the vehicle until it is switched to offboard.
+        marker_age_s: of the last sighting of the marker that the mission hangs on; NaN without one.
     """
 
     time_s: float
@@ -389,3 +390,4 @@ class Status:
     action: Action = Action.NOTHING
     pace: float = 1.0
     pilot_flies: bool = False
+    marker_age_s: float = math.nan

@@ -1,7 +1,15 @@
 """Mission files: where to fly, how fast, within which limits, and what to do at the end.
 
 Points are [x, y, z] in metres along east, north and up from the ground at the take-off point (frame `takeoff`) or from
-PX4's local origin (frame `local`). Angles are degrees in the file, because people write it, and radians behind.
+PX4's local origin (frame `local`). In the frame `marker` they count from the bundle's origin: x is the horizontal
+direction out of the page towards the viewer, z is up however the page leans, and y is to the left of x (of a board on
+a wall: to its viewer's right). A page within 45 deg of lying flat (on the floor, under a deck) has no such direction:
+there x is where its upper edge points. So [4.2, 0, 0.2] is 4.2 m in front of a board and 0.2 m above its centre, and
+`yaw: {rule: facing, point_m: [0, 0]}` looks at it. Yaw 0 is along x. Angles are degrees in the file, because people
+write it, and radians behind.
+
+Geofence and altitudes count from the take-off point in the frame `marker` too: they are about the ground and whoever
+stands on it, not about the bundle.
 """
 
 from __future__ import annotations
@@ -12,6 +20,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from uasfly.airframe import FileModel
+from uasfly.marker_settings import MarkerSettings
 from uasfly.monitor_settings import MonitorSettings
 
 LEAST = 1e-4  # of metres, seconds, turns, m/s: what is less is a slip, and its reciprocal nothing to fly by
@@ -211,14 +220,21 @@ class Geofence(FileModel):
     """A vertical cylinder that the reference never leaves."""
 
     radius_m: Length
-    center_m: GroundPoint = (0.0, 0.0)
+    center_m: Annotated[
+        GroundPoint, Field(description="in the mission's frame; from the take-off point in the frame marker")
+    ] = (0.0, 0.0)
 
 
 class MissionLimits(FileModel):
     """Where and in which wind the mission may be flown."""
 
     geofence: Geofence | None = None
-    altitude_min_m: Annotated[Coordinate, Field(description="lowest height of the legs, in the mission's frame")] = 0.3
+    altitude_min_m: Annotated[
+        Coordinate,
+        Field(
+            description="lowest height of the legs, in the mission's frame; over the take-off point in the frame marker"
+        ),
+    ] = 0.3
     altitude_max_m: Annotated[Coordinate, Field(description="greatest height of the legs")] = 120.0
     wind_m_s: Annotated[
         Wind | None, Field(description="steady wind it may be flown in; the airframe's limit when not given")
@@ -239,9 +255,13 @@ class Mission(FileModel):
     name: Annotated[str, Field(min_length=1)]
     description: str = ""
     frame: Annotated[
-        Literal["takeoff", "local"],
-        Field(description="origin of the points: the ground at the take-off point, or PX4's local origin"),
+        Literal["takeoff", "local", "marker"],
+        Field(
+            description="origin of the points: the ground at the take-off point, PX4's local origin, or a bundle of "
+            "markers (x out of its page, z up; see the section marker)"
+        ),
     ] = "takeoff"
+    marker: Annotated[MarkerSettings | None, Field(description="the bundle of the frame marker")] = None
     takeoff: Takeoff
     legs: Annotated[tuple[Leg, ...], Field(min_length=1, max_length=200)]
     transition: Transition = Transition()
@@ -249,6 +269,16 @@ class Mission(FileModel):
     ending: Ending = Ending()
     limits: MissionLimits = MissionLimits()
     monitors: MonitorSettings = MonitorSettings()
+
+    @model_validator(mode="after")
+    def _marker_and_its_frame(self) -> Mission:
+        if self.frame == "marker" and self.marker is None:
+            raise ValueError("frame: marker needs the bundle it hangs on, for example marker: {bundle: four_36h11}")
+        if self.frame != "marker" and self.marker is not None:
+            raise ValueError(
+                f"marker: belongs to frame: marker, found frame: {self.frame}; leave it out or change frame"
+            )
+        return self
 
     def yaw_rule(self, leg: int) -> FixedYaw | PathYaw | FacingYaw:
         """The yaw rule of a leg: its own or the mission's."""

@@ -96,6 +96,22 @@ class GnssDriftMonitor(Monitor):
     rate_m_s: Annotated[Positive, Field(description="mean over a second")] = 0.6
 
 
+class MarkerLostMonitor(Monitor):
+    """The marker that the mission hangs on is not seen: GNSS and the model alone hold the vehicle in its frame."""
+
+    action: ActionName = "hold"
+    after_s: Annotated[Seconds, Field(description="since the last sighting")] = 5.0
+    clear_s: Seconds = 1.0
+
+
+class MarkerMovedMonitor(Monitor):
+    """The marker is seen where it cannot be: it was moved, and is not flown after, as if it were lost."""
+
+    after_s: Seconds = 0.3
+    away_m: Annotated[Positive, Field(description="mean of the last sightings")] = 0.2
+    turned_deg: Annotated[Positive, Field(description="mean of the last sightings")] = 15.0
+
+
 class FenceMonitor(Monitor):
     """The vehicle is beyond the mission's limits; these bound the reference, so the vehicle has a margin."""
 
@@ -159,6 +175,8 @@ class MonitorSettings(FileModel):
     gnss_degraded: GnssDegradedMonitor = GnssDegradedMonitor()
     gnss_jump: GnssJumpMonitor = GnssJumpMonitor()
     gnss_drift: GnssDriftMonitor = GnssDriftMonitor()
+    marker_lost: MarkerLostMonitor = MarkerLostMonitor()
+    marker_moved: MarkerMovedMonitor = MarkerMovedMonitor()
     geofence: FenceMonitor = FenceMonitor()
     altitude: FenceMonitor = FenceMonitor()
     tracking: TrackingMonitor = TrackingMonitor()

@@ -7,6 +7,8 @@ import math
 import pytest
 from pydantic import ValidationError
 
+from uasfly.errors import FileError
+from uasfly.files import load_file
 from uasfly.mission import (
     BackAndForthLeg,
     CircleLeg,
@@ -102,3 +104,42 @@ def test_a_mission_survives_its_own_json():
     """What the log stores is the mission again."""
     original = mission(limits={"geofence": {"radius_m": 5.0}}, yaw={"rule": "path"})
     assert Mission.model_validate_json(original.model_dump_json()) == original
+
+
+def test_a_marker_and_its_frame_belong_together():
+    """One without the other is a slip; the rest has defaults."""
+    hangs = mission(frame="marker", marker={"bundle": "four_36h11"})
+    assert hangs.marker is not None
+    assert hangs.marker.until_seen.action == "hold"
+    assert hangs.marker.until_seen.then == "end"
+    assert hangs.marker.until_seen.turn_rate_rad_s == pytest.approx(math.radians(15.0))
+    with pytest.raises(ValidationError, match="frame: marker needs the bundle"):
+        mission(frame="marker")
+    for frame in ("takeoff", "local"):
+        with pytest.raises(ValidationError, match=f"found frame: {frame}"):
+            mission(frame=frame, marker={"bundle": "four_36h11"})
+
+
+@pytest.mark.parametrize(
+    ("until_seen", "expected"),
+    [
+        ({"action": "look"}, "expected one of hold, search, found 'look'"),
+        ({"turn_rate_deg_s": 0}, "turn_rate_deg_s"),
+        ({"timeout_s": 0}, "timeout_s"),
+        ({"then": "wait"}, "then"),
+        ({"timout_s": 5}, "timeout_s"),
+    ],
+)
+def test_slips_in_the_block_of_the_marker_are_named(tmp_path, until_seen, expected):
+    """With line, field and what was expected."""
+    path = tmp_path / "m.yaml"
+    block = "\n".join(f"    {key}: {value}" for key, value in until_seen.items())
+    path.write_text(
+        "name: m\nframe: marker\nmarker:\n  bundle: four_36h11\n  until_seen:\n"
+        f"{block}\ntakeoff: {{height_m: 1.0}}\nlegs:\n  - {{type: hover, position_m: [4.2, 0, 0.2], duration_s: 5}}\n"
+    )
+    with pytest.raises(FileError) as caught:
+        load_file(path, Mission)
+    (problem,) = caught.value.problems
+    assert problem.startswith("line 6: marker.until_seen.")
+    assert expected in problem

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import re
 
+import numpy as np
 import pytest
 
 from tests.trajectories.motion import mission as any_mission
 from uasfly.airframe import Airframe
 from uasfly.files import find_file, load_file, parse_overrides
 from uasfly.mission import Mission
-from uasfly.trajectories.feasibility import Finding, check_mission
+from uasfly.trajectories.feasibility import Finding, check_mission, check_placed
+from uasfly.trajectories.mission_trajectory import MissionTrajectory
+from uasfly.trajectories.placement import Placement
 
 HOVER = {"type": "hover", "position_m": (0, 0, 1.5), "duration_s": 5.0}
 LINE = {"type": "line", "to_m": (60, 0, 1.5), "speed_m_s": 2.0, "acceleration_m_s2": 1.0}
@@ -212,3 +216,48 @@ def test_missions_come_from_files_too(f550):
     """The same check, by name."""
     fast = load_file(find_file("mission", "circle"), Mission, parse_overrides(["legs[0].period_s=3"]))
     assert any(finding.field == "legs[0].period_s" for finding in check_mission(fast, f550))
+
+
+MARKER = {"frame": "marker", "marker": {"bundle": "four_36h11"}}
+STANDOFF = {"type": "hover", "position_m": (4.2, 0, 0.2), "duration_s": 5.0}
+
+
+def test_a_mission_of_a_marker_is_checked_without_knowing_where_it_is(f550):
+    """As if its first leg began where the take-off ends; what is then outside is a warning only."""
+    fenced = {"geofence": {"radius_m": 3.0}, "altitude_max_m": 2.0}
+    assert check_mission(mission(STANDOFF, **MARKER, limits=fenced), f550) == []
+    far = {**STANDOFF, "position_m": (4.2, 4.0, 1.2)}
+    findings = check_mission(mission(STANDOFF, far, **MARKER, limits=fenced), f550)
+    assert {(finding.severity, finding.field) for finding in findings} == {
+        ("warning", "limits.geofence.radius_m"),
+        ("warning", "limits.altitude_max_m"),
+    }
+    assert all("if the first leg begins where the take-off ends" in finding.text for finding in findings)
+
+
+def test_an_airframes_limits_are_errors_in_a_markers_frame_too(f550):
+    """A leg that is too fast is too fast anywhere, and so is a take-off beyond the altitudes."""
+    fast = {**LINE, "from_m": (3, 0, 0), "speed_m_s": 9.0}
+    assert only(check_mission(mission(fast, **MARKER, limits={"altitude_min_m": 0.5}), f550)).field.startswith(
+        "legs[0]"
+    )
+    low = mission(STANDOFF, **MARKER, limits={"altitude_min_m": 2.0})
+    assert "takeoff.height_m" in {finding.field for finding in check_mission(low, f550)}
+
+
+def test_a_bundle_that_nobody_has_is_an_error(f550):
+    """With the names there are."""
+    lost = mission(STANDOFF, frame="marker", marker={"bundle": "for_36h11"})
+    finding = only(check_mission(lost, f550))
+    assert finding.field == "marker.bundle"
+    assert "did you mean four_36h11" in finding.text
+
+
+def test_a_placed_mission_is_held_against_the_fence_around_the_take_off(f550):
+    """Ways between the legs included; in place it has nothing to say."""
+    flight = mission(STANDOFF, **MARKER, limits={"geofence": {"radius_m": 6.0}})
+    take_off, start = np.array((1.0, 2.0, 0.0)), np.array((1.0, 2.0, 1.5))
+    for distance, fields in ((8.0, []), (12.0, ["limits.geofence.radius_m"] * 2)):
+        placement = Placement(np.array((1.0 + distance, 2.0, 1.3)), math.pi)
+        trajectory = MissionTrajectory(flight, f550.limits, start, 0.0, placement)
+        assert [finding.field for finding in check_placed(flight, trajectory, take_off)] == fields

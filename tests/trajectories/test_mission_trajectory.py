@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from tests.trajectories.motion import HOME, LIMITS, assert_consistent, fly, mission, peak, peak_jerk
 from uasfly.trajectories.mission_trajectory import MissionTrajectory
+from uasfly.trajectories.placement import Placement
 
 LEGS = (
     {"type": "hover", "position_m": (0, 0, 1.5), "duration_s": 3.0},
@@ -181,16 +182,50 @@ def test_the_takeoff_point_is_the_origin_and_can_be_moved():
     """Points shift with it; points in PX4's local frame do not."""
     origin, other = np.array((10.0, -5.0, 2.0)), np.array((11.0, -5.0, 2.5))
     hover = {"type": "hover", "position_m": (1, 2, 3), "duration_s": 2.0}
-    flight = MissionTrajectory(mission(hover), LIMITS, HOME, 0.0, takeoff_in_world=origin)
+    flight = MissionTrajectory(mission(hover), LIMITS, HOME, 0.0, placement=Placement(origin))
     end = np.array((flight.duration_s,))
     np.testing.assert_allclose(flight.sample(np.zeros(1)).position_in_world[0], HOME)
     np.testing.assert_allclose(flight.sample(end).position_in_world[0], origin + np.array((1, 2, 3)))
-    moved = flight.reanchored(other)
+    moved = flight.reanchored(Placement(other))
     np.testing.assert_allclose(moved.sample(end).position_in_world[0], other + np.array((1, 2, 3)))
     np.testing.assert_allclose(flight.sample(end).position_in_world[0], origin + np.array((1, 2, 3)))
-    local = MissionTrajectory(mission(hover, frame="local"), LIMITS, HOME, 0.0, takeoff_in_world=origin)
-    for one in (local, local.reanchored(other)):
+    local = MissionTrajectory(mission(hover, frame="local"), LIMITS, HOME, 0.0, placement=Placement(origin))
+    for one in (local, local.reanchored(Placement(other))):
         np.testing.assert_allclose(one.sample(end).position_in_world[0], (1, 2, 3))
+
+
+@pytest.mark.parametrize("heading", [0.7, -2.9])
+def test_a_turned_frame_turns_the_whole_reference_exactly(heading):
+    """Positions, derivatives, yaw and the scalar path: those of the mission's own frame, turned and moved."""
+    placement = Placement(np.array((10.0, -5.0, 2.0)), heading)
+    own = MissionTrajectory(mission(*LEGS), LIMITS, START, 2.5)
+    placed = MissionTrajectory(mission(*LEGS), LIMITS, placement.to_world(START), 2.5 + heading, placement)
+    cosine, sine = math.cos(heading), math.sin(heading)
+    turn = np.array(((cosine, -sine, 0.0), (sine, cosine, 0.0), (0.0, 0.0, 1.0)))
+    times = np.linspace(-1.0, own.duration_s + 1.0, 2001)
+    expected = own.sample(times)
+    for trajectory in (placed, own.reanchored(placement), placed.reanchored(Placement(START)).reanchored(placement)):
+        reference = trajectory.sample(times)
+        assert trajectory.duration_s == pytest.approx(own.duration_s)
+        np.testing.assert_allclose(
+            reference.position_in_world, placement.origin + expected.position_in_world @ turn.T, atol=1e-9
+        )
+        np.testing.assert_allclose(reference.velocity_in_world, expected.velocity_in_world @ turn.T, atol=1e-9)
+        np.testing.assert_allclose(reference.acceleration_in_world, expected.acceleration_in_world @ turn.T, atol=1e-9)
+        np.testing.assert_allclose(reference.yaw_rad, expected.yaw_rad + heading, atol=1e-9)
+        np.testing.assert_allclose(reference.yaw_rate_rad_s, expected.yaw_rate_rad_s, atol=1e-9)
+        for index in range(0, 2001, 100):
+            np.testing.assert_allclose(
+                trajectory.position_at(float(times[index])), reference.position_in_world[index], atol=1e-9
+            )
+
+
+def test_a_placement_takes_points_there_and_back():
+    """The frame's x axis points where its heading says."""
+    placement = Placement(np.array((1.0, 2.0, 3.0)), math.pi / 2.0)
+    np.testing.assert_allclose(placement.to_world(np.array((4.2, 0.0, 0.2))), (1.0, 6.2, 3.2))
+    points = np.random.default_rng(1).normal(size=(5, 3))
+    np.testing.assert_allclose(placement.from_world(placement.to_world(points)), points, atol=1e-12)
 
 
 def test_a_leg_that_begins_where_the_vehicle_is_needs_no_transition():

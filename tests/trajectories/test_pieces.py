@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uasfly.trajectories.pieces import CHUNK, Pieces, PieceTable, concatenate, rest, straight_pieces
+from uasfly.trajectories.placement import Placement
 
 
 def random_pieces(seed: int, count: int = 6) -> Pieces:
@@ -73,9 +74,11 @@ def test_straight_pieces_join_up_to_the_acceleration():
             np.testing.assert_allclose(one, other, atol=1e-8)
 
 
-def test_rest_stands_still_and_an_offset_moves_everything():
-    """The offset is for the world's origin."""
-    table = PieceTable(concatenate([rest(np.array((1.0, 2.0, 3.0)), 1.0), rest(np.zeros(3), 0.0)]), np.full(3, 10.0))
+def test_rest_stands_still_and_a_placement_moves_everything():
+    """Its origin is added to every position."""
+    table = PieceTable(
+        concatenate([rest(np.array((1.0, 2.0, 3.0)), 1.0), rest(np.zeros(3), 0.0)]), Placement(np.full(3, 10.0))
+    )
     position, velocity, acceleration = table.sample(np.array((-1.0, 0.5, 9.0)))
     np.testing.assert_array_equal(position, np.array(((11.0, 12.0, 13.0),) * 3))
     assert not velocity.any()

@@ -11,9 +11,20 @@ from uasfly.files import find_file, load_file, shipped_names
 from uasfly.mission import Mission
 from uasfly.trajectories.feasibility import check_mission
 from uasfly.trajectories.mission_trajectory import MissionTrajectory
+from uasfly.trajectories.placement import Placement
 
 AIRFRAMES = ("aurelia_x6", "f550", "iris", "px4_sih")
-MISSIONS = ("back_and_forth", "circle", "figure_eight", "hover", "line", "spiral", "waypoints")
+MISSIONS = (
+    "back_and_forth",
+    "circle",
+    "figure_eight",
+    "hover",
+    "line",
+    "marker_hover",
+    "marker_standoff",
+    "spiral",
+    "waypoints",
+)
 
 
 def load(name: str) -> Mission:
@@ -21,7 +32,7 @@ def load(name: str) -> Mission:
     return load_file(find_file("mission", name), Mission)
 
 
-def test_the_seven_missions_are_shipped():
+def test_these_missions_are_shipped():
     """Neither more nor less than the documentation says."""
     assert tuple(shipped_names("mission")) == MISSIONS
 
@@ -41,6 +52,21 @@ def test_its_reference_is_smooth(name):
     limits = load_file(find_file("airframe", "f550"), Airframe).limits
     trajectory = MissionTrajectory(load(name), limits, HOME + np.array((0.1, -0.1, 0.05)), 0.3)
     assert_consistent(trajectory, jerk=2.0, step_s=0.005)
+
+
+def test_the_missions_with_markers_have_the_papers_figures():
+    """137 s over the floor; 4.2 m off the board and 0.2 m above its centre, looking at it."""
+    limits = load_file(find_file("airframe", "aurelia_x6"), Airframe).limits
+    over = MissionTrajectory(load("marker_hover"), limits, HOME, 0.0)
+    assert over.spans[-1].end_s - over.spans[-1].start_s == pytest.approx(137.0)
+    board = Placement(np.array((5.0, 3.0, 1.6)), -2.0)  # which looks there
+    off = MissionTrajectory(load("marker_standoff"), limits, HOME, 0.3, board)
+    assert off.spans[-1].end_s - off.spans[-1].start_s == pytest.approx(120.0)
+    end = off.sample(np.array((off.duration_s,)))
+    ahead = np.array((np.cos(-2.0), np.sin(-2.0), 0.0))
+    np.testing.assert_allclose(end.position_in_world[0], board.origin + 4.2 * ahead + (0.0, 0.0, 0.2), atol=1e-9)
+    nose = np.array((np.cos(end.yaw_rad[0]), np.sin(end.yaw_rad[0]), 0.0))
+    np.testing.assert_allclose(nose, -ahead, atol=1e-6)
 
 
 def test_the_missions_of_the_paper_have_its_figures():

@@ -99,8 +99,7 @@ def load_plan(
 
 def mission_bundle(mission: Mission) -> str | None:
     """Name of the bundle that a mission flies by, None for none."""
-    marker = getattr(mission, "marker", None)
-    return None if marker is None else str(marker.bundle)
+    return None if mission.marker is None else mission.marker.bundle
 
 
 def build_pilot(
@@ -126,7 +125,19 @@ def build_pilot(
 
     controller = build_controller(plan, timer, late_counts=late_counts)
     observer = Observer(plan.airframe, 0 if plan.sight is None else len(plan.sight.bundles))
-    return Pilot(plan.airframe, plan.mission, observer, controller, engage, preflight=preflight, only_check=only_check)
+    flies_by = None
+    if plan.sight is not None and plan.mission.marker is not None:
+        flies_by = plan.sight.bundles[0].marker_id
+    return Pilot(
+        plan.airframe,
+        plan.mission,
+        observer,
+        controller,
+        engage,
+        preflight=preflight,
+        only_check=only_check,
+        marker_id=flies_by,
+    )
 
 
 def build_controller(plan: FlightPlan, timer: Callable[[], float] | None, *, late_counts: bool) -> Controller:

@@ -6,7 +6,7 @@ The same step serves the live flight, the rehearsal and the replay of a log: sam
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,12 +16,13 @@ from uasfly.control.controller import Controller, ControlResult
 from uasfly.flight.choices import EndingAction, Engage
 from uasfly.flight.clearance import Clearance
 from uasfly.flight.course import Course
+from uasfly.flight.echo import echo, told
+from uasfly.flight.marker_guide import MarkerGuide
 from uasfly.flight.monitors import Monitors, Watched
 from uasfly.flight.preflight import Preflight, announcements, as_pilot_flies, stop_reason
 from uasfly.flight.response import Response
 from uasfly.flight.sequencer import Sequencer
 from uasfly.flight.view import VehicleView
-from uasfly.frames import euler_from_quaternion
 from uasfly.messages import (
     Action,
     Alarm,
@@ -40,7 +41,6 @@ from uasfly.observer.diagnosis import Diagnosis
 from uasfly.observer.observer import Observer
 from uasfly.preflight_messages import PreflightCheck
 
-TARGET_FRESH_S = 0.5  # an older attitude target is not what the vehicle is being told
 _ENDINGS = {Action.END: None, Action.RETURN: EndingAction.RETURN, Action.LAND: EndingAction.LAND}
 
 
@@ -67,6 +67,7 @@ class Pilot:
         engage: who brings the vehicle into offboard.
         preflight: whether a preflight check comes before each take-off; its facts (`FactsSample`) have to be handed in.
         only_check: the flight is over after the preflight check.
+        marker_id: number of the mission's bundle in the sightings; without it the first that is seen.
     """
 
     def __init__(
@@ -79,6 +80,7 @@ class Pilot:
         *,
         preflight: bool = False,
         only_check: bool = False,
+        marker_id: int | None = None,
     ) -> None:
         self.airframe = airframe
         self.mission = mission
@@ -95,6 +97,9 @@ class Pilot:
         self._preflight = Preflight(mission, airframe, engage)
         self.monitors = Monitors(mission, airframe)
         self.course = Course(mission, airframe.limits)
+        self._guide: MarkerGuide | None = None
+        if mission.marker is not None:
+            self._guide = MarkerGuide(mission.marker, marker_id, airframe.limits.yaw_rate_rad_s)
         self._meter = AuthorityMeter(airframe.limits, airframe.model, mission.transition.speed_m_s)
         self._response = Response()
         self._phase = self.sequencer.phase  # as far as this object has followed it
@@ -150,15 +155,17 @@ class Pilot:
         self._reference = None
         alarms: tuple[Alarm, ...] = ()
         if estimate is not None:
+            if self._guide is not None:
+                self._guide.look(time_s, self.observer)
             self._follow_phase(time_s, estimate)
             authority = self._authority(time_s, estimate, k_thrust)
             alarms = self._watch(time_s, estimate, authority)
             self._respond(time_s, estimate, alarms)
         if sequencer.streaming and estimate is not None:
-            setpoint = None if sequencer.in_offboard else self._echo(time_s)
+            setpoint = None if sequencer.in_offboard else echo(self.view, time_s, self.airframe.limits)
             if setpoint is None:
                 if not self._streamed:
-                    self.controller.reset(time_s, self._told(time_s))
+                    self.controller.reset(time_s, told(self.view, time_s))
                 control = self.controller.step(time_s, estimate, self.reference_at, self.view.voltage_v)
                 setpoint = control.setpoint
                 if control.text:
@@ -197,9 +204,11 @@ class Pilot:
 
     def _follow_phase(self, time_s: float, estimate: StateEstimate) -> None:
         """Origin and reference for the phase that the flight is in now."""
-        sequencer, course = self.sequencer, self.course
+        sequencer, course, guide = self.sequencer, self.course, self._guide
         before, self._phase = self._phase, sequencer.phase
         changed = before is not self._phase
+        if guide is not None and self._phase in (Phase.ENGAGE, Phase.LEGS):
+            guide.place(course)
         match self._phase:
             case Phase.PREFLIGHT if changed:
                 course.drop()
@@ -211,6 +220,8 @@ class Pilot:
                 elif changed and before is not Phase.TAKEOFF:
                     course.origin = self._origin_of(estimate)
                 course.engage(time_s, estimate)
+                if guide is not None:
+                    guide.stop_waiting()
             case Phase.LEGS:
                 self._follow_legs(time_s, estimate, changed)
             case Phase.ENDING if changed and not course.done(time_s):
@@ -221,8 +232,11 @@ class Pilot:
     def _follow_legs(self, time_s: float, estimate: StateEstimate, changed: bool) -> None:
         """Begin, freeze or take up; the controller then starts from what the vehicle is told."""
         course, sequencer = self.course, self.sequencer
-        if changed and not course.begun:
-            course.start(time_s, estimate)
+        if not course.begun:
+            if changed or sequencer.silence_ended:
+                course.start(time_s, estimate)
+            if not course.begun and self._guide is not None and sequencer.streaming:
+                self._wait(time_s, self._guide)
         elif changed or sequencer.silence_ended:
             course.freeze(time_s if self._time_s is None else self._time_s)
             course.take_up(time_s, estimate)
@@ -231,13 +245,28 @@ class Pilot:
         if changed or sequencer.silence_ended:
             self._streamed = False
 
+    def _wait(self, time_s: float, guide: MarkerGuide) -> None:
+        """In offboard, but nobody knows yet where the marker is."""
+        assert self.mission.marker is not None
+        text = guide.wait(self.course)
+        if text:
+            self._leave_mission(time_s, Action(self.mission.marker.until_seen.then), text)
+
+    def _leave_mission(self, time_s: float, action: Action, reason: str) -> None:
+        """One of the actions after which the mission is over."""
+        if action is Action.HAND_OVER:
+            self.sequencer.leave(time_s, reason)
+        else:
+            self.sequencer.end(time_s, reason, _ENDINGS[action])
+
     def _watch(self, time_s: float, estimate: StateEstimate, authority: Authority) -> tuple[Alarm, ...]:
         """Ask the monitors; they look while uasfly flies, and at some things always."""
         origin = self.course.origin
         flying = self._phase is Phase.LEGS and self.sequencer.streaming and origin is not None
         place = np.zeros(3) if origin is None else origin
         self._reference = self.course.place_at(time_s) if flying else None
-        return self.monitors.check(
+        guide = self._guide
+        alarms = self.monitors.check(
             Watched(
                 time_s=time_s,
                 flying=flying,
@@ -249,8 +278,15 @@ class Pilot:
                 reference=self._reference,
                 control=self._control,
                 authority=authority,
+                marker=None if guide is None else guide.marker,
+                by_marker=guide is not None and self.course.begun,
             )
         )
+        if guide is not None:
+            guide.judge(self.observer, alarms, self.course.begun)
+            self.sequencer.announcements += guide.announcements
+            guide.announcements.clear()
+        return alarms
 
     def _respond(self, time_s: float, estimate: StateEstimate, alarms: tuple[Alarm, ...]) -> None:
         """Do what the worst alarm asks for, where uasfly flies."""
@@ -259,10 +295,8 @@ class Pilot:
         sequencer.announcements += response.update(time_s, alarms, acting)
         if not acting:
             return
-        if response.action in _ENDINGS:
-            sequencer.end(time_s, response.text, _ENDINGS[response.action])
-        elif response.action is Action.HAND_OVER:
-            sequencer.leave(time_s, response.text)
+        if response.action is Action.HAND_OVER or response.action in _ENDINGS:
+            self._leave_mission(time_s, response.action, response.text)
         elif response.since_s is not None and time_s - response.since_s > settings.longest_hold_s:
             sequencer.end(time_s, f"held for {settings.longest_hold_s:.0f} s: {response.text}")
         else:
@@ -280,30 +314,6 @@ class Pilot:
             if place is not None:
                 return place
         return otherwise
-
-    def _told(self, time_s: float) -> Setpoint | None:
-        """What PX4's attitude controller is being asked for, None where that is not known freshly."""
-        target = self.view.attitude_target
-        if target is None or abs(time_s - target.time_s) > TARGET_FRESH_S:
-            return None
-        roll, pitch, yaw = euler_from_quaternion(target.quaternion_body_to_world)
-        if not math.isfinite(roll + pitch + yaw + target.thrust):
-            return None
-        return Setpoint(target.time_s, roll, pitch, yaw, 0.0, target.thrust)
-
-    def _echo(self, time_s: float) -> Setpoint | None:
-        """Until PX4 is in offboard: what it is being told anyway, within the limits, so that the switch is no bump."""
-        told = self._told(time_s)
-        if told is None:
-            return None
-        limits = self.airframe.limits
-        return replace(
-            told,
-            time_s=time_s,
-            roll_rad=min(max(told.roll_rad, -limits.tilt_rad), limits.tilt_rad),
-            pitch_rad=min(max(told.pitch_rad, -limits.tilt_rad), limits.tilt_rad),
-            thrust=min(max(told.thrust, limits.thrust_min), limits.thrust_max),
-        )
 
     def _origin_of(self, estimate: StateEstimate) -> Array:
         if self.mission.frame == "local":
@@ -325,7 +335,7 @@ class Pilot:
         reference, progress = None, 0.0
         if course.begun and sequencer.phase in (Phase.LEGS, Phase.ENGAGE):
             progress = course.progress(time_s)
-        if in_legs and course.begun:
+        if in_legs and (course.begun or self._guide is not None):
             reference = course.place_at(time_s) if self._reference is None else self._reference
         elif sequencer.phase in (Phase.ENDING, Phase.DONE):
             progress = 1.0
@@ -353,4 +363,5 @@ class Pilot:
             action=self._response.action,
             pace=course.pace(time_s) if in_legs else 0.0,
             pilot_flies=sequencer.pilot_flies,
+            marker_age_s=math.nan if self._guide is None else self._guide.age_s,
         )

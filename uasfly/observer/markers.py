@@ -23,12 +23,13 @@ SCALE_MIN, SCALE_MAX = 0.1, 1e6
 
 @dataclass(frozen=True, slots=True)
 class SightingResult:
-    """Outcome of a sighting of a known marker: new packed state, scale of its noise, innovation test."""
+    """Outcome of a sighting of a known marker: new packed state, scale of its noise, innovation test and innovation."""
 
     packed: Array
     scale: float
     nis: float
     accepted: bool
+    innovation: Array
 
 
 class MarkerAlgebra:
@@ -90,7 +91,7 @@ class MarkerAlgebra:
         accepted = nis < GATE_6
         next_scale = scale + weight * (_scale_sample(R, inverse, innovation, nis, sighting.covariance) - scale)
         if not accepted:
-            return SightingResult(packed, next_scale, nis, False)
+            return SightingResult(packed, next_scale, nis, False, innovation)
         K = cross @ inverse
         left = np.eye(layout.errors) - K @ H
         P = left @ P @ left.T + K @ R @ K.T
@@ -101,7 +102,7 @@ class MarkerAlgebra:
             (packed, np.ascontiguousarray(0.5 * (P + P.T)), K @ innovation),
             (result[layout.nominal], result[layout.covariance]),
         )
-        return SightingResult(result, next_scale, nis, True)
+        return SightingResult(result, next_scale, nis, True, innovation)
 
 
 def _scale_sample(R: Array, inverse: Array, innovation: Array, nis: float, stated: Array) -> float:

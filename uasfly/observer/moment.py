@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from uasfly.messages import Array
 from uasfly.observer import states as s
@@ -58,12 +60,37 @@ class Moment:
         total: float = sum(self.packed[start : start + 9 : 4].tolist())
         return math.sqrt(max(0.0, total) / 3.0)
 
+    def without(self, marker_id: int) -> Moment:
+        """The same filter without one of its markers: what it knows of the rest stays."""
+        measured = self.measured
+        if isinstance(measured, Sighting) and measured.marker_id == marker_id:
+            measured = None
+        if marker_id not in self.markers:
+            return replace(self, measured=measured)
+        index, layout = self.markers.index(marker_id), self.layout
+        keep = np.delete(np.arange(layout.errors), s.marker_error(index))
+        P = self.packed[layout.covariance].reshape(layout.errors, layout.errors)
+        nominal = np.delete(self.packed[layout.nominal], s.marker_nominal(index))
+        return replace(
+            self,
+            packed=np.concatenate((nominal, P[np.ix_(keep, keep)].ravel(), self.packed[layout.matched.start :])),
+            markers=self.markers[:index] + self.markers[index + 1 :],
+            scales=self.scales[:index] + self.scales[index + 1 :],
+            sighted_s=self.sighted_s[:index] + self.sighted_s[index + 1 :],
+            measured=measured,
+        )
+
 
 @dataclass(slots=True)
 class Verdict:
-    """What the gate said of one sensor: normalised innovation squared, degrees of freedom, accepted or not."""
+    """What the gate said of one sensor: normalised innovation squared, degrees of freedom, accepted or not.
+
+    A sighting also says how far away [m] and how turned [rad] the marker is against where the filter has it.
+    """
 
     sensor: str
     nis: float
     dof: int
     accepted: bool
+    away_m: float = 0.0
+    turned_rad: float = 0.0

@@ -29,6 +29,7 @@ from uasfly.observer.door import Odometry, Sighting, checked_odometry, checked_s
 from uasfly.observer.expected import ExpectedMarker, expected_marker
 from uasfly.observer.gnss import DriftWatch, Outage
 from uasfly.observer.moment import Moment, Verdict
+from uasfly.observer.sightings import MarkerEstimate, SightingLog, marker_estimate
 from uasfly.observer.step import Stepper, hover_thrust_history
 from uasfly.observer.timeline import Timeline
 
@@ -83,6 +84,7 @@ class Observer:
         self._k_thrust_m_s2 = airframe.model.k_thrust_m_s2
         self._timeline: Timeline | None = None
         self._journal = Journal()
+        self._sightings = SightingLog()
         self._drift = DriftWatch(airframe.observer.gnss_bias_density)
         self._agreement = Agreement()
         self._outage = Outage(airframe.observer.velocity_sigma_m_s)
@@ -183,6 +185,27 @@ class Observer:
         core = self._stepper.extrapolated(moment, max(time_s, moment.time_s))
         return expected_marker(moment, core, marker_id)
 
+    def marker(self, time_s: float, marker_id: int | None = None) -> MarkerEstimate | None:
+        """A marker as the filter has it, None where it does not know it; without an id the first that it has seen."""
+        moment = self.moment
+        if moment is None or not moment.markers:
+            return None
+        wanted = moment.markers[0] if marker_id is None else marker_id
+        return marker_estimate(moment, wanted, self._sightings.contradiction(wanted, time_s))
+
+    def trust(self, marker_id: int, trusted: bool) -> None:
+        """Whether sightings of a marker are used; where not, they are still looked at, see `marker`."""
+        if trusted:
+            self._stepper.distrusted.discard(marker_id)
+        else:
+            self._stepper.distrusted.add(marker_id)
+
+    def forget(self, marker_id: int) -> None:
+        """Take a marker out of the filter: its next sighting is the first."""
+        if self._timeline is not None:
+            self._timeline.forget(marker_id)
+        self._sightings.forget(marker_id)
+
     @property
     def moment(self) -> Moment | None:
         """The filter where it stands (nominal state, markers, time); None before the first odometry sample."""
@@ -230,14 +253,14 @@ class Observer:
                     self._agreement.look(measured, timeline.newest.position_sigma_m)
                     self._stepper.agrees = self._agreement.agrees
                 verdicts = timeline.append(time_s, measured, self._in_air)
-                self._note(time_s, verdicts)
+                self._note(measured, verdicts)
                 if isinstance(measured, Odometry):
                     self._drift.look(measured, verdicts)
                     self._stepper.bias_free = self._drift.runs_away
                     self._journal.follow(time_s, timeline.newest)
             else:
                 self.counters.late += 1
-                self._note(time_s, timeline.insert(measured))
+                self._note(measured, timeline.insert(measured))
 
     def _is_confirmed(self, measured: Odometry | Sighting) -> bool:
         """Whether a sample far ahead is believed: one alone is a wrong time stamp, a second soon after confirms it."""
@@ -265,8 +288,11 @@ class Observer:
             self.counters.restarts += 1
             self._start(measured)
 
-    def _note(self, time_s: float, verdicts: tuple[Verdict, ...]) -> None:
+    def _note(self, measured: Odometry | Sighting, verdicts: tuple[Verdict, ...]) -> None:
+        time_s = measured.time_s
         for verdict in verdicts:
+            if isinstance(measured, Sighting):
+                self._sightings.note(time_s, measured.marker_id, verdict)
             self.statistics[verdict.sensor] = (verdict.nis, verdict.dof)
             self._journal.note(time_s, verdict)
             if not verdict.accepted:

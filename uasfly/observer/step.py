@@ -47,6 +47,7 @@ class Stepper:
         self._noise = noise
         self.bias_free = False  # whether GNSS runs away from everything else: its bias takes what it says
         self.agrees = True  # whether measured position and velocity tell the same motion
+        self.distrusted: set[int] = set()  # markers whose sightings are looked at, but not used
         self._window_s = noise.matching_window_s
         self._correlations_s = (
             noise.attitude_correlation_s,
@@ -209,7 +210,10 @@ class Stepper:
     def _sighting(self, moment: Moment, sighting: Sighting) -> tuple[Moment, tuple[Verdict, ...]]:
         """The moment after the sighting; `moment` is already predicted to its time."""
         count = len(moment.markers)
+        distrusted = sighting.marker_id in self.distrusted
         if sighting.marker_id not in moment.markers:
+            if distrusted:
+                return moment, ()
             self.prepare(count + 1, in_flight=True)
             grown = replace(
                 moment,
@@ -224,12 +228,23 @@ class Stepper:
         result = self._marker_algebra.sighting(
             moment.packed, count, index, sighting, moment.scales[index], self._matching_weight(interval_s)
         )
+        away, turned = result.innovation[:3], result.innovation[3:]
+        verdict = Verdict(
+            s.MARKER_SENSOR,
+            result.nis,
+            s.MARKER_DOF,
+            result.accepted,
+            math.sqrt(float(away @ away)),
+            math.sqrt(float(turned @ turned)),
+        )
+        if distrusted:
+            return moment, (verdict,)
         scales = (*moment.scales[:index], result.scale, *moment.scales[index + 1 :])
         updated = replace(moment, packed=result.packed, scales=scales)
         if result.accepted:
             sighted_s = (*moment.sighted_s[:index], sighting.time_s, *moment.sighted_s[index + 1 :])
             updated = replace(updated, sighted_s=sighted_s)
-        return updated, (Verdict(s.MARKER_SENSOR, result.nis, s.MARKER_DOF, result.accepted),)
+        return updated, (verdict,)
 
     def _matching_weight(self, interval_s: float) -> float:
         """Weight of a new innovation in an exponential mean with half the window as time constant."""

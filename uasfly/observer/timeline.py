@@ -70,6 +70,10 @@ class Timeline:
             self._moments.append(moment)
         return verdicts
 
+    def forget(self, marker_id: int) -> None:
+        """Take a marker out of every moment, and its sightings with it."""
+        self._moments = [moment.without(marker_id) for moment in self._moments]
+
     def _index_at(self, time_s: float) -> int:
         if self._moments[-1].time_s <= time_s:
             return len(self._moments) - 1

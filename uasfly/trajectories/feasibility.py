@@ -9,19 +9,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from uasfly.airframe import GRAVITY_M_S2, Airframe
+from uasfly.errors import FileError
+from uasfly.files import find_file
 from uasfly.messages import Array, ReferenceHorizon
 from uasfly.mission import FacingYaw, Mission, WaypointsLeg
 from uasfly.trajectories.mission_trajectory import MissionTrajectory, Span
 from uasfly.trajectories.pieces import CHUNK
+from uasfly.trajectories.placement import AT_ORIGIN
 from uasfly.trajectories.trajectory import TrajectoryError
 
 SAMPLE_S = 0.02
+COARSE_S = 0.1  # where it is looked at in flight
+ASSUMED_START = np.array((3.0, 0.0, 0.0))  # in the frame of a marker, of which nobody knows yet where it is
+ASSUMED_START.flags.writeable = False
 ROUNDING = 1e-6
 MARGIN = 0.15  # of tilt (its tangent) and thrust that should be left for gusts
 
@@ -42,27 +48,60 @@ class Finding:
 
 
 def check_mission(mission: Mission, airframe: Airframe) -> list[Finding]:
-    """Everything about a mission that the airframe cannot do, errors first."""
-    start = np.array((0.0, 0.0, mission.takeoff.height_m))
-    findings = [*_takeoff(mission), *_transition_speeds(mission, airframe)]
+    """Everything about a mission that the airframe cannot do, errors first.
+
+    Of a mission in a marker's frame it is assumed that its first leg begins where the take-off ends: what then is
+    outside of geofence or altitudes is a warning, for the flight looks again when it has seen the marker.
+    """
+    findings = [*_bundle(mission), *_takeoff(mission), *_transition_speeds(mission, airframe)]
     try:
-        trajectory = MissionTrajectory(mission, airframe.limits, start, 0.0)
+        trajectory = trajectory_from_takeoff(mission, airframe)
     except TrajectoryError as error:
         return [Finding("error", error.field, error.text), *findings]
     wind = _wind(mission, airframe)
+    origin = _assumed_origin(mission, trajectory)
     worst = _Effort()
     for span in trajectory.spans:
-        if mission.frame == "local" and span is trajectory.spans[0] and not span.is_leg:
+        if mission.frame != "takeoff" and span is trajectory.spans[0] and not span.is_leg:
             continue  # where it begins is known in flight only
         peaks = _Peaks()
         for reference in _samples(trajectory, span):
-            peaks.add(mission, reference)
+            peaks.add(mission, reference, origin)
             worst.add(span, airframe, wind, reference)
-        findings += _within_fence(mission, span, peaks)
+        outside = _within_fence(mission, span, peaks)
+        findings += map(_assuming, outside) if mission.frame == "marker" else outside
         if span.is_leg:
             findings += _within_limits(mission, airframe, span, peaks)
     findings += _headroom(mission, airframe, wind, worst)
     return sorted(findings, key=lambda finding: finding.severity != "error")
+
+
+def trajectory_from_takeoff(mission: Mission, airframe: Airframe) -> MissionTrajectory:
+    """The mission from where its take-off ends, before anything flies.
+
+    Raises:
+        TrajectoryError: it cannot be flown.
+    """
+    if mission.frame == "marker":
+        return MissionTrajectory(mission, airframe.limits, ASSUMED_START, math.pi)
+    return MissionTrajectory(mission, airframe.limits, np.array((0.0, 0.0, mission.takeoff.height_m)), 0.0)
+
+
+def check_placed(mission: Mission, trajectory: MissionTrajectory, origin: Array) -> list[Finding]:
+    """Where a whole mission leaves its geofence and altitudes, ways between legs included.
+
+    Args:
+        mission: the limits.
+        trajectory: of this mission, as it lies in the world.
+        origin: (3,) m, world: what the limits count from.
+    """
+    findings: list[Finding] = []
+    for span in trajectory.spans:
+        peaks = _Peaks()
+        for reference in _samples(trajectory, span, COARSE_S):
+            peaks.add(mission, reference, origin)
+        findings += _within_fence(mission, span, peaks)
+    return findings
 
 
 def check_way_in(mission: Mission, trajectory: MissionTrajectory) -> list[Finding]:
@@ -104,8 +143,8 @@ def _wind(mission: Mission, airframe: Airframe) -> float:
     return airframe.limits.wind_m_s if mission.limits.wind_m_s is None else mission.limits.wind_m_s
 
 
-def _samples(trajectory: MissionTrajectory, span: Span) -> Iterator[ReferenceHorizon]:
-    count = max(2, math.ceil((span.end_s - span.start_s) / SAMPLE_S) + 1)
+def _samples(trajectory: MissionTrajectory, span: Span, step_s: float = SAMPLE_S) -> Iterator[ReferenceHorizon]:
+    count = max(2, math.ceil((span.end_s - span.start_s) / step_s) + 1)
     times = np.linspace(span.start_s, span.end_s, count)
     for first in range(0, count, CHUNK):
         yield trajectory.sample(times[first : first + CHUNK])
@@ -118,8 +157,8 @@ class _Peaks:
         self.speed = self.climb = self.descent = self.acceleration = self.distance = 0.0
         self.lowest, self.highest = math.inf, -math.inf
 
-    def add(self, mission: Mission, reference: ReferenceHorizon) -> None:
-        position, velocity = reference.position_in_world, reference.velocity_in_world
+    def add(self, mission: Mission, reference: ReferenceHorizon, origin: Array = AT_ORIGIN.origin) -> None:
+        position, velocity = reference.position_in_world - origin, reference.velocity_in_world
         center = mission.limits.geofence.center_m if mission.limits.geofence else (0.0, 0.0)
         self.speed = max(self.speed, _longest(velocity))
         self.climb = max(self.climb, float(velocity[:, 2].max()))
@@ -159,9 +198,31 @@ class _Effort:
             self.least, self.least_span = float(least.min()), span.leg
 
 
+def _bundle(mission: Mission) -> Iterator[Finding]:
+    if mission.marker is not None:
+        try:
+            find_file("bundle", mission.marker.bundle)
+        except FileError as error:
+            yield Finding("error", "marker.bundle", f"{mission.marker.bundle}: {'; '.join(error.problems)}")
+
+
+def _assumed_origin(mission: Mission, trajectory: MissionTrajectory) -> Array:
+    """(3,) m: what the limits count from, in the frame of the trajectory."""
+    if mission.frame != "marker":
+        return AT_ORIGIN.origin
+    first = next(span for span in trajectory.spans if span.is_leg)
+    x, y, z = trajectory.position_at(first.start_s)
+    return np.array((x, y, z - mission.takeoff.height_m))
+
+
+def _assuming(finding: Finding) -> Finding:
+    text = f"if the first leg begins where the take-off ends, {finding.text}"
+    return replace(finding, severity="warning", text=text)
+
+
 def _takeoff(mission: Mission) -> Iterator[Finding]:
     height, limits = mission.takeoff.height_m, mission.limits
-    if mission.frame == "takeoff" and not limits.altitude_min_m <= height <= limits.altitude_max_m:
+    if mission.frame != "local" and not limits.altitude_min_m <= height <= limits.altitude_max_m:
         text = (
             f"take-off to {height:g} m ends outside limits.altitude_min_m {limits.altitude_min_m:g} to "
             f"limits.altitude_max_m {limits.altitude_max_m:g}; choose a height between them"

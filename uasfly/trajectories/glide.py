@@ -44,10 +44,7 @@ class Glide:
         times = reference.time_s
         if float(times[0]) >= self.start_s + self.duration_s:
             return reference
-        s = np.clip((times - self.start_s) / self.duration_s, 0.0, 1.0)
-        share = 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-        speed = -30.0 * s**2 * (1.0 - s) ** 2 / self.duration_s
-        acceleration = -60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / self.duration_s**2
+        share, speed, acceleration = faded((times - self.start_s) / self.duration_s, self.duration_s)
         return ReferenceHorizon(
             times,
             reference.position_in_world + np.outer(share, self.offset_m),
@@ -56,6 +53,20 @@ class Glide:
             reference.yaw_rad + share * self.yaw_offset_rad,
             reference.yaw_rate_rad_s + speed * self.yaw_offset_rad,
         )
+
+
+def faded(share_of_time: Array, duration_s: float) -> tuple[Array, Array, Array]:
+    """What is left (n,) of something that fades out, and its first [1/s] and second [1/s^2] derivative.
+
+    Args:
+        share_of_time: (n,) of the duration that has gone by; clipped to 0..1.
+        duration_s: the whole.
+    """
+    s = np.clip(share_of_time, 0.0, 1.0)
+    share = 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    speed = -30.0 * s**2 * (1.0 - s) ** 2 / duration_s
+    acceleration = -60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / duration_s**2
+    return share, speed, acceleration
 
 
 def glide_time_s(offset_m: Array, turn_rad: float, transition: Transition, limits: Limits) -> float:

@@ -34,6 +34,7 @@ from uasfly.trajectories.figure_eight import figure_eight
 from uasfly.trajectories.hover import hover
 from uasfly.trajectories.line import line
 from uasfly.trajectories.pieces import Pieces, PieceTable, concatenate, rest
+from uasfly.trajectories.placement import AT_ORIGIN, Placement
 from uasfly.trajectories.polyline import move
 from uasfly.trajectories.profile import MotionLimits
 from uasfly.trajectories.spiral import spiral
@@ -74,7 +75,7 @@ class MissionTrajectory:
         airframe_limits: speeds, acceleration and yaw rate.
         start_position: (3,) m, world, where the first transition begins, at rest.
         start_yaw: [rad], world.
-        takeoff_in_world: (3,) m, the ground at the take-off point; origin of missions in the frame `takeoff`.
+        placement: where the mission's frame lies; not asked in the frame `local`, which is the world.
 
     Raises:
         TrajectoryError: a leg cannot be flown in the time it gives, or the mission takes more than two hours.
@@ -86,14 +87,15 @@ class MissionTrajectory:
         airframe_limits: Limits,
         start_position: Array,
         start_yaw: float,
-        takeoff_in_world: Array | None = None,
+        placement: Placement | None = None,
     ) -> None:
         self.mission = mission
-        origin = np.zeros(3) if takeoff_in_world is None or mission.frame == "local" else takeoff_in_world
+        self._placement = placement = AT_ORIGIN if placement is None or mission.frame == "local" else placement
         parts: list[Pieces] = []
         yaws: list[yaw_motion.YawKnots] = []
         spans: list[Span] = []
-        position, heading, time = np.asarray(start_position, dtype=float) - origin, float(start_yaw), 0.0
+        position = placement.from_world(np.asarray(start_position, dtype=float))
+        heading, time = float(start_yaw) - placement.heading_rad, 0.0
         for index, leg in enumerate(mission.legs):
             pieces = _leg_pieces(mission, index, airframe_limits, position)
             if not pieces.duration_s <= LONGEST_S - time:
@@ -121,8 +123,8 @@ class MissionTrajectory:
         self.spans: tuple[Span, ...] = tuple(spans)
         self._starts = [span.start_s for span in spans]
         self._pieces = concatenate(parts)
-        self._table = PieceTable(self._pieces, origin)
-        self._yaw = yaw_motion.YawTable(yaws)
+        self._table = PieceTable(self._pieces, placement)
+        self._yaw = yaw_motion.YawTable(yaws, placement.heading_rad)
 
     @property
     def duration_s(self) -> float:
@@ -151,11 +153,13 @@ class MissionTrajectory:
         """Whether a leg flies at a time: not in transitions, not before the start, not after the end."""
         return 0.0 <= time_s <= self.duration_s and self.span_at(time_s).is_leg
 
-    def reanchored(self, takeoff_in_world: Array) -> MissionTrajectory:
-        """The same trajectory with the take-off point (3,) [m] elsewhere; the frame `local` has no such point."""
+    def reanchored(self, placement: Placement) -> MissionTrajectory:
+        """The same trajectory with the mission's frame elsewhere; the frame `local` lies where it lies."""
         moved = copy.copy(self)
-        if self.mission.frame == "takeoff":
-            moved._table = PieceTable(self._pieces, takeoff_in_world)
+        if self.mission.frame != "local":
+            moved._placement = placement
+            moved._table = PieceTable(self._pieces, placement)
+            moved._yaw = self._yaw.turned(placement.heading_rad - self._placement.heading_rad)
         return moved
 
 

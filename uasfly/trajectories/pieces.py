@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uasfly.messages import Array
+from uasfly.trajectories.placement import Placement
 
 CUBIC = slice(0, 3)  # columns of a polynomial: x, y, z [m]
 PHASE = 3  # [rad]
@@ -81,21 +82,23 @@ class PieceTable:
 
     Args:
         pieces: the pieces; the last one should end at rest, for it holds its end afterwards.
-        offset: (3,) [m] added to every position.
+        placement: where the pieces' frame lies; what is sampled is in the frame that it lies in.
     """
 
-    def __init__(self, pieces: Pieces, offset: Array | None = None) -> None:
+    def __init__(self, pieces: Pieces, placement: Placement | None = None) -> None:
         self._pieces = pieces
         ends = np.cumsum(pieces.durations_s)
         self.duration_s = float(ends[-1]) if ends.size else 0.0
         self._starts = np.concatenate(([0.0], ends[:-1]))
-        polynomials = pieces.polynomials.copy()
-        if offset is not None:
-            polynomials[:, 0, CUBIC] += offset
+        polynomials, harmonics = pieces.polynomials.copy(), pieces.harmonics
+        if placement is not None:
+            polynomials[:, :, CUBIC] = placement.turned(polynomials[:, :, CUBIC])
+            polynomials[:, 0, CUBIC] += placement.origin
+            harmonics = placement.turned(harmonics)
         self._derivatives = np.ascontiguousarray(_polynomials_and_derivatives(polynomials).transpose(0, 2, 1))
         self._start_list: list[float] = self._starts.tolist()
         self._coefficients: list[list[list[float]]] = polynomials.transpose(0, 2, 1).tolist()
-        distinct, groups = np.unique(pieces.harmonics.reshape(-1, HARMONICS * 3), axis=0, return_inverse=True)
+        distinct, groups = np.unique(harmonics.reshape(-1, HARMONICS * 3), axis=0, return_inverse=True)
         self._groups: NDArray[np.intp] = groups.reshape(-1)  # pieces of one leg share their harmonics
         self._group_list: list[int] = self._groups.tolist()
         vectors = distinct.reshape(-1, HARMONICS, 3)

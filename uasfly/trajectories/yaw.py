@@ -5,6 +5,7 @@ Yaw is kept as knots joined by cubics (Hermite), unwrapped: it never jumps by a 
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass
 
@@ -98,16 +99,29 @@ def along(
 
 
 class YawTable:
-    """Samples the knots of consecutive spans at many times at once."""
+    """Samples the knots of consecutive spans at many times at once.
 
-    def __init__(self, spans: list[YawKnots]) -> None:
+    Args:
+        spans: the knots.
+        heading_rad: added to every yaw.
+    """
+
+    def __init__(self, spans: list[YawKnots], heading_rad: float = 0.0) -> None:
         widths, coefficients = zip(*(_hermite(span) for span in spans), strict=True)
         width = np.concatenate(widths)
         self._coefficients = np.concatenate(coefficients, axis=1)
+        self._coefficients[0] += heading_rad
         self._constant = [not any(cubic) for cubic in self._coefficients[1:].T.tolist()]
         ends = np.cumsum(width)
         self._starts = np.concatenate(([0.0], ends[:-1]))
         self._end = float(ends[-1])
+
+    def turned(self, angle_rad: float) -> YawTable:
+        """The same with an angle added to every yaw."""
+        result = copy.copy(self)
+        result._coefficients = self._coefficients.copy()
+        result._coefficients[0] += angle_rad
+        return result
 
     def sample(self, times_s: Array) -> tuple[Array, Array]:
         """Yaw [rad] and yaw rate [rad/s], (n,) each, at (n,) times, which are clamped."""

@@ -107,3 +107,16 @@ def test_a_place_that_is_not_known_is_told() -> None:
     assert verdict("first waypoint", **LOST) is WARNING
     assert verdict("geofence", estimate=estimate((np.nan, 0.0, 0.0))) is WARNING
     assert verdict("first waypoint", estimate=estimate((np.nan, 0.0, 0.0))) is WARNING
+
+
+def test_a_mission_of_a_marker_has_its_first_waypoint_where_nobody_knows_yet() -> None:
+    """That is told; what its fence says of the place where it stands is told as ever."""
+    hangs = {"frame": "marker", "marker": {"bundle": "four_36h11"}}
+    line = check("first waypoint", mission=mission(**hangs))
+    assert line.verdict is OK
+    assert "marker" in line.value
+    assert verdict("geofence", mission=mission(**hangs)) is OK
+    slow = mission(
+        **hangs, legs=[{"type": "waypoints", "points": [{"position_m": [0, 0, 1]}, {"position_m": [9e3, 0, 1]}]}]
+    )
+    assert verdict("first waypoint", mission=slow) is STOP

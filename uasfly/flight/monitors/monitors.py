@@ -6,6 +6,7 @@ from uasfly.airframe import Airframe
 from uasfly.flight.monitors.battery import BatteryEnds, BatteryLow
 from uasfly.flight.monitors.estimate import UncertainEstimate, not_finite
 from uasfly.flight.monitors.gnss import GnssDegraded, GnssDrift, GnssJump, GnssLost
+from uasfly.flight.monitors.marker import MarkerLost, MarkerMoved
 from uasfly.flight.monitors.motion import FarFromReference, OutsideAltitudes, OutsideFence, Tilted
 from uasfly.flight.monitors.solver import Fallbacks
 from uasfly.flight.monitors.watch import Watch
@@ -26,7 +27,7 @@ class Monitors:
         s, limits = mission.monitors, mission.limits
         fallbacks = Fallbacks(s.solver)
         told = Monitor(action="warn", after_s=s.wind.after_s, clear_s=5.0)
-        self._watches = (
+        self._watches: tuple[Watch, ...] = (
             Watch("estimate", _AT_ONCE, not_finite),
             Watch("estimate", s.estimate, UncertainEstimate(s.estimate)),
             Watch("gnss_lost", s.gnss_lost, GnssLost(), flying_only=False),
@@ -46,6 +47,12 @@ class Monitors:
             Watch("solver", Monitor(action="warn", after_s=0.0), fallbacks.late),
             Watch("solver", s.solver, fallbacks.backup),
         )
+        if mission.frame == "marker":
+            found_late = s.marker_lost.model_copy(update={"after_s": 0.0})  # the finding has that age itself
+            self._watches += (
+                Watch("marker_lost", found_late, MarkerLost(s.marker_lost)),
+                Watch("marker_moved", s.marker_moved, MarkerMoved(s.marker_moved), flying_only=False),
+            )
 
     def check(self, watched: Watched) -> tuple[Alarm, ...]:
         """What is an alarm now, the mission's order of monitors."""

@@ -8,6 +8,7 @@ from uasfly.control.protocol import ControlResult
 from uasfly.flight.view import VehicleView
 from uasfly.messages import Array, Authority, StateEstimate
 from uasfly.observer.diagnosis import Diagnosis
+from uasfly.observer.sightings import MarkerEstimate
 
 
 @dataclass(slots=True)
@@ -19,11 +20,13 @@ class Watched:
         flying: uasfly's setpoints fly the vehicle now.
         estimate, diagnosis: of the observer, for now.
         view: what the vehicle has said.
-        origin: (3,) m, of the mission, in the world.
+        origin: (3,) m, world: what geofence and altitudes count from.
         home: (3,) m, world: where the vehicle stood before take-off, or was first met.
         reference: (3,) m, world: where it should be now; None where nothing asks for a place.
         control: the last step's result, None where nothing was controlled.
         authority: what the wind has taken.
+        marker: that the mission hangs on, None where the filter does not know it.
+        by_marker: the mission hangs on a marker, and has begun.
     """
 
     time_s: float
@@ -36,3 +39,5 @@ class Watched:
     reference: Array | None
     control: ControlResult | None
     authority: Authority
+    marker: MarkerEstimate | None = None
+    by_marker: bool = False

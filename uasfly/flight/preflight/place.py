@@ -13,7 +13,7 @@ from uasfly.frames import euler_from_quaternion
 from uasfly.messages import Array
 from uasfly.monitor_settings import Monitor
 from uasfly.preflight_messages import PreflightCheck
-from uasfly.trajectories.feasibility import check_way_in
+from uasfly.trajectories.feasibility import check_way_in, trajectory_from_takeoff
 from uasfly.trajectories.mission_trajectory import MissionTrajectory
 from uasfly.trajectories.trajectory import TrajectoryError
 
@@ -27,11 +27,16 @@ _FIRST = Subject("first waypoint", "the mission begins with a straight way from 
 def plan_from_here(gathered: Gathered) -> MissionTrajectory | str | None:
     """The mission from where it would begin, in its own frame; a text where it cannot be flown, None without a place.
 
-    On the ground it begins at the height of the take-off.
+    On the ground it begins at the height of the take-off. Where a marker is, is not known yet: see `check_mission`.
     """
     place = _place(gathered)
     if place is None or gathered.estimate is None:
         return None
+    if gathered.mission.frame == "marker":
+        try:
+            return trajectory_from_takeoff(gathered.mission, gathered.airframe)
+        except TrajectoryError as error:
+            return f"{error.field}: {error.text}"
     start = place if gathered.view.in_air else place + np.array((0.0, 0.0, gathered.mission.takeoff.height_m))
     _, _, yaw = euler_from_quaternion(gathered.estimate.quaternion_body_to_world)
     try:
@@ -97,6 +102,8 @@ def _first_waypoint(gathered: Gathered, plan: MissionTrajectory | str | None) ->
         return _FIRST.warning("position not known", "wait for the estimate")
     if isinstance(plan, str):
         return _FIRST.stop("cannot be flown from here", plan)
+    if gathered.mission.frame == "marker":
+        return _FIRST.ok("hangs on the marker: limits are checked when it has been seen")
     span = plan.spans[0]
     way_s = 0.0 if span.is_leg else span.end_s - span.start_s
     begin, end = plan.sample(np.array((0.0, way_s))).position_in_world
