@@ -368,6 +368,7 @@ class Status:
         pace: rate at which the mission's own time runs: 1 as planned, 0 held, negative on the way back.
         pilot_flies: the mission waits, because somebody else has the vehicle until it is switched to offboard.
         marker_age_s: of the last sighting of the marker that the mission hangs on; NaN without one.
+        waits_for: what the vehicle waits for, in offboard, before the legs can begin; "" for nothing.
     """
 
     time_s: float
@@ -391,3 +392,4 @@ class Status:
     pace: float = 1.0
     pilot_flies: bool = False
     marker_age_s: float = math.nan
+    waits_for: str = ""

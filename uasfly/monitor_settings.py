@@ -108,7 +108,7 @@ class MarkerMovedMonitor(Monitor):
     """The marker is seen where it cannot be: it was moved, and is not flown after, as if it were lost."""
 
     after_s: Seconds = 0.3
-    away_m: Annotated[Positive, Field(description="mean of the last sightings")] = 0.2
+    away_m: Annotated[Positive, Field(description="mean of the last sightings")] = 0.3
     turned_deg: Annotated[Positive, Field(description="mean of the last sightings")] = 15.0
 
 

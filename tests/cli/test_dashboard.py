@@ -95,6 +95,12 @@ def test_what_is_unknown_is_a_dash() -> None:
     assert not re.search(r"\bnan\b|\binf\b", _text(scene(not_finite(math.nan))))
 
 
+def test_the_age_of_the_marker_is_told_where_a_mission_hangs_on_one() -> None:
+    """Beside that of the telemetry; other missions have none."""
+    assert "marker" not in _text(scene(status()))
+    assert "marker 0.2 s" in _text(scene(status(marker_age_s=0.2)))
+
+
 @pytest.mark.parametrize(
     ("changes", "word", "colour"),
     [
@@ -103,6 +109,8 @@ def test_what_is_unknown_is_a_dash() -> None:
         ({"action": Action.SLOW_DOWN}, "SLOWED", "yellow"),
         ({"action": Action.HOLD}, "HOLDING", "yellow"),
         ({"action": Action.BACK_OFF}, "BACKING OFF", "yellow"),
+        ({"waits_for": "the marker"}, "WAITING", "yellow"),
+        ({"waits_for": "the marker", "action": Action.LAND}, "LANDING", "red"),
         ({"action": Action.END}, "ENDING", "red"),
         ({"action": Action.RETURN}, "RETURNING", "red"),
         ({"action": Action.LAND}, "LANDING", "red"),

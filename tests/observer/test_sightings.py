@@ -92,3 +92,28 @@ def test_a_distrusted_marker_moves_nothing_but_is_still_looked_at() -> None:
     last = recording().sightings[-1]
     observer.add(replace(last, time_s=7.951))
     assert observer.marker(8.0).seen_s == 7.951  # type: ignore[union-attr]
+
+
+def test_a_forgotten_marker_is_taken_anew_and_the_rest_is_kept() -> None:
+    """Vehicle and its covariance stay to the bit, late samples do not bring it back, the next sighting is the first."""
+    offset = np.array((0.5, 0.0, 0.0))
+    observer = fly(offset, until_s=MOVED_S + 0.5)
+    flight = recording()
+    core, covariance = observer.moment.packed[: s.CORE_NOMINAL], observer.covariance  # type: ignore[union-attr]
+    observer.forget(7)
+    assert observer.marker(MOVED_S + 0.5) is None
+    np.testing.assert_array_equal(observer.moment.packed[: s.CORE_NOMINAL], core)  # type: ignore[union-attr]
+    np.testing.assert_array_equal(observer.covariance, covariance[: s.CORE_ERROR, : s.CORE_ERROR])
+    observer.forget(7)
+    late = flight.odometry[round(MOVED_S / 0.01) + 40]
+    observer.add(replace(late, time_s=late.time_s + 0.004))
+    assert observer.marker(MOVED_S + 0.5) is None
+    k = round((MOVED_S + 0.55) / 0.01)
+    for odometry in flight.odometry[k - 4 : k + 1]:
+        observer.add(odometry)
+    observer.add(moved(flight.sightings[k // 10], offset, flight.quaternion[k], 0.0))
+    marker = observer.marker(MOVED_S + 0.55)
+    assert marker is not None
+    assert marker.seen_s == pytest.approx(MOVED_S + 0.55)
+    assert marker.contradiction.away_m == 0.0
+    np.testing.assert_allclose(marker.position_in_world, MARKER[:3] + offset, atol=0.3)

@@ -58,6 +58,8 @@ def headline(status: Status) -> Headline:
 
 
 def _legs(status: Status) -> Headline:
+    if status.waits_for and status.action not in _ACTIONS:
+        return Headline("WAITING", CAREFUL, f"for {status.waits_for}")
     if status.action not in _ACTIONS:
         return Headline("FLYING", GOING, "as planned" if not status.alarms else "as planned, with a warning")
     word, colour = _ACTIONS[status.action]

@@ -125,12 +125,13 @@ def battery(status: Status, width: int) -> Row:
 
 
 def telemetry(status: Status) -> Row:
-    """Age of the last odometry."""
-    age_s = status.telemetry_age_s
+    """Age of the last odometry, and of the last sighting of the marker that the mission hangs on."""
+    age_s, marker_s = status.telemetry_age_s, status.marker_age_s
     if not math.isfinite(age_s):
         return row(label("telemetry"), ("none yet", YELLOW))
     text = f"{age_s * 1e3:.0f} ms old" if age_s < 1.0 else f"{age_s:.1f} s old"
-    return row(label("telemetry"), (text, graded(age_s, 0.1, 0.2)))
+    marker = row((", marker ", "dim"), (f"{marker_s:.1f} s", graded(marker_s, 1.0, 5.0))) if marker_s >= 0.0 else []
+    return [*row(label("telemetry"), (text, graded(age_s, 0.1, 0.2))), *marker]
 
 
 def rates(scene: Scene) -> Row:

@@ -364,4 +364,5 @@ class Pilot:
             pace=course.pace(time_s) if in_legs else 0.0,
             pilot_flies=sequencer.pilot_flies,
             marker_age_s=math.nan if self._guide is None else self._guide.age_s,
+            waits_for="the marker" if in_legs and self._guide is not None and not course.begun else "",
         )

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from uasfly.airframe import GRAVITY_M_S2, Airframe
-from uasfly.errors import FileError
+from uasfly.errors import FileError, shortened
 from uasfly.files import find_file
 from uasfly.messages import Array, ReferenceHorizon
 from uasfly.mission import FacingYaw, Mission, WaypointsLeg
@@ -203,7 +203,7 @@ def _bundle(mission: Mission) -> Iterator[Finding]:
         try:
             find_file("bundle", mission.marker.bundle)
         except FileError as error:
-            yield Finding("error", "marker.bundle", f"{mission.marker.bundle}: {'; '.join(error.problems)}")
+            yield Finding("error", "marker.bundle", f"{shortened(mission.marker.bundle)}: {'; '.join(error.problems)}")
 
 
 def _assumed_origin(mission: Mission, trajectory: MissionTrajectory) -> Array:
