@@ -142,6 +142,10 @@ class ObserverNoise(FileModel):
     attitude_density: Annotated[Positive, Field(description="[rad/s/sqrt(Hz)] gyro noise")]
     force_density: Annotated[Positive, Field(description="[m/s^2/sqrt(s)] random walk of the wind force")]
     gnss_bias_density: Annotated[Positive, Field(description="[m/sqrt(s)] random walk of the GNSS bias")]
+    velocity_wander_density: Annotated[
+        NonNegative,
+        Field(description="[m/sqrt(s)] how the integral of PX4's velocity walks away from a marker that is seen"),
+    ] = 0.02
     position_sigma_m: Positive
     attitude_sigma_rad: Positive
     velocity_sigma_m_s: Positive

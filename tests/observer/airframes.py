@@ -20,6 +20,7 @@ F550_NOISE = ObserverNoise(
     attitude_density=0.01,
     force_density=1.0,
     gnss_bias_density=0.01,
+    velocity_wander_density=0.0,
     position_sigma_m=0.01,
     attitude_sigma_rad=0.0035,
     velocity_sigma_m_s=0.05,

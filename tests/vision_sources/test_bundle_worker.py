@@ -13,7 +13,7 @@ from uasfly.frames import rotation_matrix
 from uasfly.messages import MarkerSample
 from uasfly.sim.camera.process import CameraProcess
 from uasfly.sim.camera.settings import Background, Noise
-from uasfly.vision.bundle_worker import watch_bundle
+from uasfly.vision.bundle_worker import watch_bundles
 from uasfly.vision.tracker import MarkerPrediction
 
 PATIENCE_S = 60.0
@@ -36,20 +36,22 @@ def test_a_simulated_cameras_stream_becomes_marker_samples() -> None:
 
         flight = threading.Thread(target=fly, daemon=True)
         flight.start()
-        worker = watch_bundle(camera, views.four(), process.url)
+        worker = watch_bundles(camera, (views.four(),), process.url)
         samples: list[MarkerSample] = []
         deadline = time.monotonic() + PATIENCE_S
         while len(samples) < 4:
             assert time.monotonic() < deadline, worker.take_announcements()
             for seen in worker.take():
-                assert seen.result.sample is not None
-                assert seen.result.sample.time_s == seen.exposed_s
+                (look,) = seen.result
+                assert look.sample is not None
+                assert look.sample.time_s == seen.exposed_s
                 assert seen.arrived_s - seen.exposed_s >= 0.05
-                samples.append(seen.result.sample)
+                samples.append(look.sample)
             time.sleep(0.01)
             if samples:
                 last = samples[-1]
-                worker.predict(MarkerPrediction(last.position_in_body, last.quaternion_marker_to_body))
+                expected = MarkerPrediction(last.position_in_body, last.quaternion_marker_to_body)
+                worker.predict({last.marker_id: expected})
         worker.close()
         stop.set()
         flight.join()
@@ -61,7 +63,7 @@ def test_a_simulated_cameras_stream_becomes_marker_samples() -> None:
 def test_pictures_of_another_size_are_named(tmp_path: Path) -> None:
     """A calibration of 640 x 480 is of no use for other pictures: the pilot is told so."""
     cv2.imwrite(str(tmp_path / "1.png"), np.zeros((100, 200), dtype=np.uint8))
-    worker = watch_bundle(views.camera(), views.four(), str(tmp_path), rate_hz=50.0, loop=True)
+    worker = watch_bundles(views.camera(), (views.four(),), str(tmp_path), rate_hz=50.0, loop=True)
     said: list[str] = []
     deadline = time.monotonic() + PATIENCE_S
     while not any("found 200 x 100" in text for text in said):
@@ -73,7 +75,7 @@ def test_pictures_of_another_size_are_named(tmp_path: Path) -> None:
 
 def test_a_source_that_is_none_is_announced() -> None:
     """Its name is wrong: nothing is raised in the cycle, the pilot is told what was expected."""
-    worker = watch_bundle(views.camera(), views.four(), "no/such/camera")
+    worker = watch_bundles(views.camera(), (views.four(),), "no/such/camera")
     said: list[str] = []
     deadline = time.monotonic() + PATIENCE_S
     while not any("found no such thing" in text for text in said):

@@ -59,6 +59,9 @@ def fly(
     controller: options.Controller = "nmpc",
     engage: EngageOption = None,
     system_id: SystemId = None,
+    camera: options.Camera = None,
+    bundles: options.Bundles = None,
+    camera_source: options.CameraSource = None,
     settings: options.Settings = None,
     log: options.Log = None,
     no_log: NoLog = False,
@@ -74,6 +77,7 @@ def fly(
     from uasfly.cli.live_view import LiveView
     from uasfly.cli.output import check_writable, finish
     from uasfly.drivers.flight import Flight, fly_flight
+    from uasfly.drivers.sight import SightOptions
 
     check_writable(log, "flight log")
     check_writable(summary, "summary")
@@ -90,6 +94,7 @@ def fly(
         system_id=system_id,
         settings=settings or [],
         log=None if no_log else log or _default_log(mission),
+        sight=SightOptions(camera, tuple(bundles or ()), camera_source),
     )
     picture = Capture(capture) if capture is not None else None
     with LiveView(mission, airframe, capture=picture) as view:

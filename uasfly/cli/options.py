@@ -21,6 +21,30 @@ Settings = Annotated[
         "or mission.takeoff.height_m=2; may be given several times.",
     ),
 ]
+Camera = Annotated[
+    str | None,
+    typer.Option(
+        "--camera",
+        help="Camera: a shipped name (vga) or a YAML file; none; or, in rehearsals, model or model:FILE for the noise "
+        "model instead of rendered pictures. A mission that flies by a bundle has one anyway in simulations.",
+    ),
+]
+Bundles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--bundle",
+        help="Bundle of markers to look for: a shipped name or a YAML file; may be given several times. "
+        "Without it the mission's own, or the first of the scenario.",
+    ),
+]
+CameraSource = Annotated[
+    str | None,
+    typer.Option(
+        "--camera-source",
+        help="Where frames come from in flight: index (0), device, rtsp:// or http:// stream, video file or folder; "
+        "not needed with --sim.",
+    ),
+]
 Log = Annotated[Path | None, typer.Option("--log", help="Flight log (MCAP; opens in Foxglove and PlotJuggler).")]
 Summary = Annotated[Path | None, typer.Option("--summary", help="Write the closing summary to this JSON file.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON instead of a table.")]

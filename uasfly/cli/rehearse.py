@@ -24,6 +24,8 @@ def rehearse(
     scenario: options.Scenario = "calm",
     seed: options.Seed = 1,
     controller: options.Controller = "nmpc",
+    camera: options.Camera = None,
+    bundles: options.Bundles = None,
     settings: options.Settings = None,
     log: options.Log = None,
     summary: options.Summary = None,
@@ -43,11 +45,15 @@ def rehearse(
     from uasfly.drivers.checking import refuse_infeasible
     from uasfly.drivers.plan import load_plan
     from uasfly.drivers.rehearse import rehearse as run
+    from uasfly.drivers.sight import SightOptions
 
     check_writable(log, "flight log")
     check_writable(summary, "summary")
     check_writable(capture, "picture")
-    plan = load_plan(mission, airframe, controller=controller, seed=seed, scenario=scenario, settings=settings)
+    sight = SightOptions(camera, tuple(bundles or ()))
+    plan = load_plan(
+        mission, airframe, controller=controller, seed=seed, scenario=scenario, settings=settings, sight=sight
+    )
     refuse_infeasible(plan.mission, plan.airframe, lambda text: typer.echo(text, err=True))
     picture = Capture(capture) if capture is not None else None
     recent = Recent(plan.mission.name)

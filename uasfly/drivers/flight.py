@@ -16,8 +16,10 @@ from typing import Any
 
 from uasfly.drivers.checking import refuse_infeasible
 from uasfly.drivers.live import fly
+from uasfly.drivers.live_eyes import LiveEyes, open_eyes
 from uasfly.drivers.plan import FlightPlan, build_pilot, load_plan
 from uasfly.drivers.preflight import gather_facts, time_solver
+from uasfly.drivers.sight import NO_SIGHT, SightOptions
 from uasfly.drivers.watching import Watch
 from uasfly.errors import UasflyError
 from uasfly.flight.choices import Engage
@@ -46,6 +48,7 @@ class Flight:
     settings: list[str] = field(default_factory=list)
     log: Path | None = None
     only_check: bool = False
+    sight: SightOptions = NO_SIGHT
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +87,10 @@ def fly_flight(
         seed=flight.seed,
         scenario=scenario,
         settings=flight.settings,
+        sight=flight.sight,
     )
+    if plan.sight is not None and plan.sight.modelled:
+        raise UasflyError("--camera model belongs to rehearsals; a simulated flight has rendered pictures, as a stream")
     if planned is not None:
         planned(plan)
     refuse_infeasible(plan.mission, plan.airframe, say)
@@ -108,16 +114,40 @@ def _fly_simulated(prepared: _Prepared) -> dict[str, Any]:
     assert plan.plant is not None
     port = free_port()
     prepared.say(f"simulated {plan.airframe.name} in {plan.scenario.name}, seed {plan.seed}")
-    with start_process(plan.plant, plan.scenario, plan.seed, remote_port=port, local_port=0) as vehicle:
-        summary = asyncio.run(_connect_and_fly(prepared, f"udpin://127.0.0.1:{port}", SIMULATED_ID))
+    scenario, scene, camera = plan.scenario, None, None
+    if plan.sight is not None and plan.sight.source is None and plan.sight.scene is not None:
+        scene, camera = plan.sight.scene, plan.sight.camera
+        scenario = scenario.model_copy(update={"camera": scene.settings})
+    with start_process(
+        plan.plant,
+        scenario,
+        plan.seed,
+        remote_port=port,
+        local_port=0,
+        camera=camera,
+        bundle=None if scene is None else scene.bundle,
+        others=() if scene is None else scene.others,
+    ) as vehicle:
+        url = f"udpin://127.0.0.1:{port}"
+        summary = asyncio.run(_connect_and_fly(prepared, url, SIMULATED_ID, vehicle.camera_url))
         if not vehicle.alive:
             summary["warnings"].append("the simulated vehicle ended by itself")
         summary["warnings"] += vehicle.complaints().splitlines()
     return summary
 
 
-async def _connect_and_fly(prepared: _Prepared, url: str, system_id: int | None) -> dict[str, Any]:
-    prepared.say(f"connecting to {url}")
+async def _connect_and_fly(
+    prepared: _Prepared, url: str, system_id: int | None, camera_url: str = ""
+) -> dict[str, Any]:
+    """Fly over a link; `camera_url` is the simulated camera's stream, "" where there is none."""
+    with open_eyes(prepared.plan.sight, camera_url) as eyes:
+        prepared.say(f"connecting to {url}")
+        return await _connect_and_look(prepared, url, system_id, eyes)
+
+
+async def _connect_and_look(
+    prepared: _Prepared, url: str, system_id: int | None, eyes: LiveEyes | None
+) -> dict[str, Any]:
     link = await MavsdkLink.connect(
         url,
         system_id=system_id,
@@ -127,7 +157,7 @@ async def _connect_and_fly(prepared: _Prepared, url: str, system_id: int | None)
     )
     try:
         gather = partial(gather_facts, link, prepared.solve_ms)
-        return await fly(prepared.plan, prepared.pilot, link, prepared.log, prepared.watch, gather)
+        return await fly(prepared.plan, prepared.pilot, link, prepared.log, prepared.watch, gather, eyes)
     finally:
         await link.close()
 

@@ -12,14 +12,26 @@ from collections.abc import Callable, Coroutine, Iterator
 from pathlib import Path
 from typing import Any
 
+from uasfly.drivers.live_eyes import LiveEyes
 from uasfly.drivers.metronome import Metronome
 from uasfly.drivers.plan import FlightPlan
+from uasfly.drivers.sight import Sight, marker_datum
 from uasfly.drivers.watching import BackgroundWatch, Cycle, Watch
 from uasfly.errors import describe_error
 from uasfly.flight.pilot import Pilot, StepResult
 from uasfly.flight.summary import SummaryCollector
 from uasfly.link.protocol import LiveLink
-from uasfly.messages import FactsSample, Phase, Request, RequestKind, RequestResult, Sample, Setpoint, Status
+from uasfly.messages import (
+    FactsSample,
+    MarkerSample,
+    Phase,
+    Request,
+    RequestKind,
+    RequestResult,
+    Sample,
+    Setpoint,
+    Status,
+)
 from uasfly.record.writer import BackgroundLogWriter
 
 HAND_OVER_S = 2.5  # time for the last request to be repeated and answered
@@ -34,6 +46,7 @@ async def fly(
     log: Path | None = None,
     watch: Watch | None = None,
     gather: Callable[[], Coroutine[Any, Any, FactsSample]] | None = None,
+    eyes: LiveEyes | None = None,
 ) -> dict[str, Any]:
     """Fly a plan over an open link and return its summary; the link is left open for its owner.
 
@@ -48,12 +61,14 @@ async def fly(
         log: file for the flight log, None for none.
         watch: called in a thread of its own with each step's status and what the driver knows of the cycle.
         gather: finds out what the preflight check wants to know, beside the cycles.
+        eyes: look for bundles beside the cycles; they are left open for their owner.
 
     Raises:
         FileError: when the log cannot be opened.
     """
     writer = BackgroundLogWriter(log, plan.description()) if log is not None else None
-    flight = _LiveFlight(pilot, link, writer, BackgroundWatch(watch) if watch is not None else None)
+    watching = BackgroundWatch(watch) if watch is not None else None
+    flight = _LiveFlight(pilot, link, writer, watching, eyes, plan.sight)
     facts = None if gather is None else asyncio.create_task(gather())
     started = time.monotonic()
     gc.collect()
@@ -74,13 +89,21 @@ class _LiveFlight:
     """One flight with those who listen to it: summary, log and live view."""
 
     def __init__(
-        self, pilot: Pilot, link: LiveLink, writer: BackgroundLogWriter | None, watch: BackgroundWatch | None
+        self,
+        pilot: Pilot,
+        link: LiveLink,
+        writer: BackgroundLogWriter | None,
+        watch: BackgroundWatch | None,
+        eyes: LiveEyes | None,
+        sight: Sight | None,
     ) -> None:
         self.summary = SummaryCollector()
         self._pilot = pilot
         self._link = link
         self._writer = writer
         self._watch = watch
+        self._eyes = eyes
+        self._sight = sight
         self._log_lost = False
         self._facts: asyncio.Task[FactsSample] | None = None
 
@@ -113,18 +136,20 @@ class _LiveFlight:
 
     def _cycle(self) -> None:
         begun = time.monotonic()
-        samples = self._link.poll() + self._gathered()
+        samples = self._link.poll() + self._gathered() + self._sighted()
         result = self._pilot.step(begun, samples)
         sent = result.setpoint is not None and self._send(result.setpoint)
         for request in result.requests:
             self._link.request(request)
+        if self._eyes is not None:
+            self._eyes.expect(begun, self._pilot.observer)
         cycle_ms = (time.monotonic() - begun) * 1e3
         if self._writer is not None and self._writer.problem and not self._log_lost:
             self._log_lost = True
             self._pilot.announce(3, self._writer.problem)
         solve_ms = None if result.control is None else result.control.solve_ms
         self.summary.timed(solve_ms, cycle_ms)
-        self.summary.cycle(result.status, samples)
+        self.summary.cycle(result.status, samples, marker_datum(self._sight, self._pilot.observer.moment))
         self.summary.preflight(result.preflight)
         self._tell_ground(result.status)
         self._record(result, samples)
@@ -142,6 +167,14 @@ class _LiveFlight:
             return (task.result(),)
         self._pilot.announce(4, f"the preflight check knows less: {describe_error(error)}")
         return ()
+
+    def _sighted(self) -> tuple[MarkerSample, ...]:
+        """What has been seen since the last cycle; camera and detection tell the pilot what troubles them."""
+        if self._eyes is None:
+            return ()
+        for severity, text in self._eyes.take_announcements():
+            self._pilot.announce(severity, text)
+        return self._eyes.look()
 
     def _send(self, setpoint: Setpoint) -> bool:
         """A setpoint that has become old on its way here (the process was stopped) does not leave."""

@@ -9,6 +9,7 @@ from typing import Any
 
 from uasfly.airframe import Airframe
 from uasfly.control.protocol import Controller
+from uasfly.drivers.sight import NO_SIGHT, Sight, SightOptions, load_sight
 from uasfly.errors import UasflyError, shortened
 from uasfly.files import find_file, load_file, parse_overrides
 from uasfly.flight.choices import Engage
@@ -30,6 +31,7 @@ class FlightPlan:
     seed: int
     scenario: Scenario | None = None
     plant: Plant | None = None
+    sight: Sight | None = None
 
     def description(self) -> dict[str, Any]:
         """Plain data for the log."""
@@ -40,6 +42,7 @@ class FlightPlan:
             "seed": self.seed,
             "scenario": None if self.scenario is None else self.scenario.model_dump(mode="json"),
             "plant": None if self.plant is None else self.plant.model_dump(mode="json"),
+            "sight": None if self.sight is None else self.sight.description(),
         }
 
     def identity(self) -> dict[str, object]:
@@ -50,6 +53,7 @@ class FlightPlan:
             "controller": self.controller,
             "scenario": None if self.scenario is None else self.scenario.name,
             "seed": self.seed,
+            "camera": None if self.sight is None else self.sight.name,
         }
 
 
@@ -61,6 +65,7 @@ def load_plan(
     seed: int = 1,
     scenario: str | None = None,
     settings: list[str] | None = None,
+    sight: SightOptions = NO_SIGHT,
 ) -> FlightPlan:
     """Read and check the files of a flight.
 
@@ -72,6 +77,7 @@ def load_plan(
         scenario: name of a shipped file or a path; without one there is no simulation.
         settings: `--set` texts, `airframe.model.drag_1_s=[0.3, 0.3, 0.3]`, `mission.takeoff.height_m=2` or
             `scenario.link.telemetry_latency_s=0.02`.
+        sight: which camera and bundles.
 
     Raises:
         FileError: for a file that cannot be used. UasflyError: for a flag that cannot be used.
@@ -87,7 +93,13 @@ def load_plan(
         plant = load_file(find_file("plant", airframe_model.plant), Plant, by_file["plant"])
     elif by_file["scenario"] or by_file["plant"]:
         raise UasflyError("--set scenario.* and plant.* need the built-in simulation (--sim or rehearse)")
-    return FlightPlan(airframe_model, mission_model, controller, seed, scenario_model, plant)
+    seen = load_sight(sight, scenario_model, mission_bundle(mission_model))
+    return FlightPlan(airframe_model, mission_model, controller, seed, scenario_model, plant, seen)
+
+
+def mission_bundle(mission: Mission) -> str | None:
+    """Name of the bundle that a mission flies by, None for none."""
+    return None if mission.marker is None else mission.marker.bundle
 
 
 def build_pilot(
@@ -112,8 +124,20 @@ def build_pilot(
     from uasfly.observer.observer import Observer
 
     controller = build_controller(plan, timer, late_counts=late_counts)
-    observer = Observer(plan.airframe)
-    return Pilot(plan.airframe, plan.mission, observer, controller, engage, preflight=preflight, only_check=only_check)
+    observer = Observer(plan.airframe, 0 if plan.sight is None else len(plan.sight.bundles))
+    flies_by = None
+    if plan.sight is not None and plan.mission.marker is not None:
+        flies_by = plan.sight.bundles[0].marker_id
+    return Pilot(
+        plan.airframe,
+        plan.mission,
+        observer,
+        controller,
+        engage,
+        preflight=preflight,
+        only_check=only_check,
+        marker_id=flies_by,
+    )
 
 
 def build_controller(plan: FlightPlan, timer: Callable[[], float] | None, *, late_counts: bool) -> Controller:

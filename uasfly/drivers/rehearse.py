@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from uasfly.drivers.eyes import make_eyes
 from uasfly.drivers.plan import FlightPlan, build_pilot
+from uasfly.drivers.sight import marker_datum
 from uasfly.drivers.watching import Cycle, Watch
 from uasfly.flight.choices import Engage
 from uasfly.flight.summary import SummaryCollector
@@ -46,6 +48,7 @@ def rehearse(plan: FlightPlan, log: Path | None = None, watch: Watch | None = No
         rng=np.random.default_rng([plan.seed, 7]),
     )
     pilot = build_pilot(plan, Engage.AUTO, time.perf_counter, late_counts=False)
+    eyes = make_eyes(plan.sight, vehicle, pilot.observer, plan.seed)
     summary = SummaryCollector()
     writer = LogWriter(log, plan.description()) if log is not None else None
     period_s = 1.0 / plan.airframe.controller.rate_hz
@@ -59,7 +62,7 @@ def rehearse(plan: FlightPlan, log: Path | None = None, watch: Watch | None = No
             now_s = cycle * period_s
             link.advance_to(now_s)
             truth = link.truth()
-            samples = link.poll()
+            samples = link.poll() + eyes.look(now_s)
             begun = time.perf_counter()
             result = pilot.step(now_s, samples)
             if result.setpoint is not None:
@@ -70,7 +73,7 @@ def rehearse(plan: FlightPlan, log: Path | None = None, watch: Watch | None = No
             solve_ms = None if result.control is None else result.control.solve_ms
             cycle_ms = (time.perf_counter() - begun) * 1e3
             summary.timed(solve_ms, cycle_ms)
-            summary.cycle(result.status, (*samples, truth))
+            summary.cycle(result.status, (*samples, truth), marker_datum(plan.sight, pilot.observer.moment))
             if writer is not None:
                 for message in (*samples, truth, *result.requests, result.setpoint, result.status):
                     if message is not None:

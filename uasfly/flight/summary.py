@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from uasfly.errors import FileError
-from uasfly.messages import Array, OdometrySample, Phase, Sample, Status, TruthSample
+from uasfly.messages import Array, MarkerSample, OdometrySample, Phase, Sample, Status, TruthSample
 from uasfly.preflight_messages import PreflightCheck
 
 KEPT_CYCLES = 256  # truth and GNSS samples are compared with cycles up to this long ago
@@ -55,11 +55,33 @@ class _SquareSum:
         return {name: math.sqrt(square / self.count) for name, square in squares.items()}
 
 
+@dataclass(frozen=True, slots=True)
+class MarkerDatum:
+    """Where a marker is as the filter has it and in truth: what a flight by that marker is measured against.
+
+    Attributes:
+        estimated_position, true_position: (3,) m, world.
+        turn_rad: about the vertical, from the true to the estimated.
+    """
+
+    estimated_position: Array
+    true_position: Array
+    turn_rad: float
+
+    def placed(self, position: Array) -> Array:
+        """A true position (3,) [m, world] as it lies in the filter's world: the same as seen from the marker."""
+        x, y, z = (position - self.true_position).tolist()
+        c, s = math.cos(self.turn_rad), math.sin(self.turn_rad)
+        placed: Array = self.estimated_position + np.array((c * x - s * y, s * x + c * y, z))
+        return placed
+
+
 @dataclass(slots=True)
 class _Cycle:
     time_s: float
     estimate: Array
     reference: Array
+    datum: MarkerDatum | None
 
 
 @dataclass(slots=True)
@@ -80,20 +102,24 @@ class SummaryCollector:
     _tracking_estimated: _SquareSum = field(default_factory=_SquareSum)
     _estimate: _SquareSum = field(default_factory=_SquareSum)
     _gnss: _SquareSum = field(default_factory=_SquareSum)
+    _tracking_by_marker: _SquareSum = field(default_factory=_SquareSum)
+    _estimate_by_marker: _SquareSum = field(default_factory=_SquareSum)
     _force_sum: Array = field(default_factory=lambda: np.zeros(3))
     _force_count: int = 0
     _solve_ms: array[float] = field(default_factory=_figures)
     _cycle_ms: array[float] = field(default_factory=_figures)
     _latency_ms: array[float] = field(default_factory=_figures)
     _setpoint_times_s: array[float] = field(default_factory=_figures)
+    _sighted_s: array[float] = field(default_factory=_figures)
+    _sighting_latency_ms: array[float] = field(default_factory=_figures)
     _fallbacks: dict[str, int] = field(default_factory=dict)
     _warnings: list[str] = field(default_factory=list)
     _preflight: list[dict[str, str]] = field(default_factory=list)
     _phase: Phase = Phase.CONNECT
     _reason: str = ""
 
-    def cycle(self, status: Status, samples: tuple[Sample, ...]) -> None:
-        """Take in one step's samples and status."""
+    def cycle(self, status: Status, samples: tuple[Sample, ...], datum: MarkerDatum | None = None) -> None:
+        """Take in one step's samples and status; `datum` where a simulated flight has a marker in its filter."""
         if self._first_s is None:
             self._first_s = status.time_s
         self.duration_s = status.time_s - self._first_s
@@ -108,7 +134,7 @@ class SummaryCollector:
             estimate = status.estimate
             assert estimate is not None
             reference = status.reference_position_in_world
-            self._cycles.append(_Cycle(status.time_s, estimate.position_in_world, reference))
+            self._cycles.append(_Cycle(status.time_s, estimate.position_in_world, reference, datum))
             self._tracking_estimated.add(estimate.position_in_world - reference)
             self._force_sum += estimate.force_in_world
             self._force_count += 1
@@ -118,6 +144,9 @@ class SummaryCollector:
                 self._truths.append(sample)
             elif isinstance(sample, OdometrySample):
                 self._pending_gnss.append(sample)
+            elif isinstance(sample, MarkerSample):
+                self._sighted_s.append(sample.time_s)
+                self._sighting_latency_ms.append((status.time_s - sample.time_s) * 1e3)
         self._compare()
 
     def abort(self, status: Status) -> None:
@@ -163,6 +192,7 @@ class SummaryCollector:
             "tracking_against": "truth" if self._tracking_true.count else "estimate",
             "estimate_rms_m": _rounded(self._estimate.rms()),
             "gnss_rms_m": _rounded(self._gnss.rms()),
+            "by_marker": self._by_marker(),
             "solve_ms": _quantiles(self._solve_ms),
             "cycle_ms": _quantiles(self._cycle_ms),
             "latency_ms": _quantiles(self._latency_ms),
@@ -171,10 +201,35 @@ class SummaryCollector:
             "fallback_steps": sum(self._fallbacks.values()),
             "fallbacks": dict(self._fallbacks),
             "rejected": dict(rejected),
+            "sightings": self._sightings(),
             "force_m_s2": [round(value, 4) for value in force.tolist()],
             "real_time_factor": round(self.duration_s / wall_s, 3) if wall_s > 0.0 else None,
             "warnings": list(self._warnings),
             "preflight": list(self._preflight),
+        }
+
+    def _by_marker(self) -> dict[str, Any] | None:
+        """Errors as seen from the marker, whose place in the world is known no better than GNSS was at first sight."""
+        if not self._tracking_by_marker.count:
+            return None
+        return {
+            "tracking_rms_m": _rounded(self._tracking_by_marker.rms()),
+            "tracking_max_m": round(self._tracking_by_marker.largest, 5),
+            "estimate_rms_m": _rounded(self._estimate_by_marker.rms()),
+            "estimate_max_m": round(self._estimate_by_marker.largest, 5),
+        }
+
+    def _sightings(self) -> dict[str, Any] | None:
+        """How often bundles were seen, and how old a sighting was when it could be used; None where none was."""
+        times = np.unique(np.array(self._sighted_s))
+        if not len(times):
+            return None
+        span = float(times[-1] - times[0])
+        return {
+            "count": len(self._sighted_s),
+            "rate_hz": round((len(times) - 1) / span, 3) if span > 0.0 else 0.0,
+            "gap_max_s": round(float(np.diff(times).max()), 3) if len(times) > 1 else None,
+            "latency_ms": _quantiles(self._sighting_latency_ms),
         }
 
     def _compare(self) -> None:
@@ -189,6 +244,10 @@ class SummaryCollector:
             reference = before.reference + weight * (after.reference - before.reference)
             self._tracking_true.add(truth.position_in_world - reference)
             self._estimate.add(estimate - truth.position_in_world)
+            if before.datum is not None:
+                placed = before.datum.placed(truth.position_in_world)
+                self._tracking_by_marker.add(placed - reference)
+                self._estimate_by_marker.add(estimate - placed)
         while self._pending_gnss and self._truths and self._pending_gnss[0].time_s <= self._truths[-1].time_s:
             gnss = self._pending_gnss.popleft()
             if not self._cycles or not self._cycles[0].time_s <= gnss.time_s <= self._cycles[-1].time_s:

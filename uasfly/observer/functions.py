@@ -60,8 +60,12 @@ def _function(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Fun
 def _predicted_covariance(covariance: ca.SX, core: ca.SX, inputs: ca.SX) -> ca.SX:
     """Phi P Phi' + Q; markers are at rest (eq. 3), so that only their correlation with the core turns."""
     n = covariance.shape[0]
+    own = es.noise_covariance(core, inputs)
+    if n > s.CORE_ERROR:  # only a marker tells a wandering velocity from motion
+        for axis in range(s.D_POSITION.start, s.D_POSITION.stop):
+            own[axis, axis] += inputs[s.IN_DT] * inputs[s.IN_WANDER_DENSITY]
     move = ca.diagcat(es.transition(core, inputs), ca.SX.eye(n - s.CORE_ERROR))
-    noise = ca.diagcat(es.noise_covariance(core, inputs), ca.SX(n - s.CORE_ERROR, n - s.CORE_ERROR))
+    noise = ca.diagcat(own, ca.SX(n - s.CORE_ERROR, n - s.CORE_ERROR))
     return up.symmetric(ca.mtimes(ca.mtimes(move, covariance), move.T) + noise)
 
 
@@ -104,7 +108,7 @@ def odometry_step(markers: int) -> ca.Function:
         block = packed[layout.matched][9 * sensor : 9 * sensor + 9]
         mean = packed[layout.mean][3 * sensor : 3 * sensor + 3]
         state = _Sensor(sensor, up.symmetric(ca.reshape(block, 3, 3)), mean, inputs)
-        motion = _is_motion(inputs, sensor)
+        motion = _is_motion(inputs, sensor, markers)
         covariance = covariance + _recovery(state, motion, layout)
         free = inputs[s.IN_BIAS_FREE]
         if sensor == s.POSITION_SENSOR:
@@ -165,12 +169,15 @@ def _held_bias(free: ca.SX, layout: s.Layout) -> ca.SX:
     return allowed
 
 
-def _is_motion(inputs: ca.SX, sensor: int) -> ca.SX:
+def _is_motion(inputs: ca.SX, sensor: int, markers: int) -> ca.SX:
     """1 where what a sensor says against the model is the vehicle's motion, not the sensor's error.
 
-    Position and velocity vouch for each other (see `agreement`); a velocity without a position is believed.
+    Position and velocity vouch for each other (see `agreement`); a velocity without a position is believed. While a
+    marker is seen it says where the vehicle is, and a measured position that says something else is wrong.
     """
     match sensor:
+        case s.POSITION_SENSOR if markers:
+            return inputs[s.IN_AGREES] * (1.0 - inputs[s.IN_BIAS_FREE])
         case s.POSITION_SENSOR:
             return inputs[s.IN_AGREES]
         case s.VELOCITY_SENSOR:

@@ -26,6 +26,7 @@ from uasfly.observer import states as s
 from uasfly.observer.agreement import Agreement
 from uasfly.observer.diagnosis import Diagnosis, Journal
 from uasfly.observer.door import Odometry, Sighting, checked_odometry, checked_sighting
+from uasfly.observer.expected import ExpectedMarker, expected_marker
 from uasfly.observer.gnss import DriftWatch, Outage
 from uasfly.observer.moment import Moment, Verdict
 from uasfly.observer.sightings import MarkerEstimate, SightingLog, marker_estimate
@@ -37,6 +38,7 @@ SILENT_AFTER_S = 0.15  # without odometry for this long estimates are predicted 
 TICK_BEHIND_S = 0.1  # and the filter itself to this long before now
 JUMP_AHEAD_S = 1.0  # a sample further ahead of the filter than this needs a second one to be believed
 LONGEST_GAP_S = 5.0  # a longer gap is not bridged: the filter starts again
+EXPECTED_WITHIN_S = 0.5  # of where the filter stands: beyond it nothing is said about where a marker is to be seen
 RESTART_AFTER_S = 1.0  # samples that are all too old for this long: the clock was set back, start again
 
 
@@ -173,6 +175,15 @@ class Observer:
             raise LookupError("the observer has nothing to diagnose before the first odometry sample")
         drift_m_s, agrees = self._drift.speed_m_s, self._agreement.agrees
         return self._journal.diagnose(time_s, moment, window_s, drift_m_s, agrees, self.counters.restarts)
+
+    def expected(self, time_s: float, marker_id: int) -> ExpectedMarker | None:
+        """Where a marker is to be seen at `time_s`; None where the filter does not know it, or stands far from then."""
+        timeline = self._timeline
+        if timeline is None or not abs(time_s - timeline.newest.time_s) < EXPECTED_WITHIN_S:
+            return None
+        moment = timeline.at(time_s)
+        core = self._stepper.extrapolated(moment, max(time_s, moment.time_s))
+        return expected_marker(moment, core, marker_id)
 
     def marker(self, time_s: float, marker_id: int | None = None) -> MarkerEstimate | None:
         """A marker as the filter has it, None where it does not know it; without an id the first that it has seen."""

@@ -86,24 +86,25 @@ IN_FORCE_DENSITY = 7  # m^2/s^4/s
 IN_ACCELERATION_DENSITY = 8  # m^2/s^4/Hz
 IN_ATTITUDE_DENSITY = 9  # rad^2/s^2/Hz
 IN_DRAG = slice(10, 13)  # 1/s
-PREDICTION_INPUTS = 13
+IN_WANDER_DENSITY = 13  # m^2/s, of the position: while a marker shows it that the measured velocity is wrong
+PREDICTION_INPUTS = 14
 IN_MOTION = slice(0, 10)  # all but the drag
 
 # Further input of an odometry step.
-IN_QUATERNION = slice(13, 17)  # measured, body to world
-IN_POSITION = slice(17, 20)  # m, measured
-IN_VELOCITY = slice(20, 23)  # m/s, measured, world
-IN_USE = slice(23, 26)  # 1 = the sensor has something to say, in the order of SENSORS
-IN_CORRELATION = slice(26, 29)  # factor on the variance for the correlation in time, in the order of SENSORS
-IN_VARIANCE = slice(29, 32)  # configured variances (rad^2, m^2, m^2/s^2)
-IN_INTERVAL = 32  # s since the sample before
-IN_MATCHING_WEIGHT = 33  # 0..1, weight of this innovation in the matched covariance
-IN_MEAN_WEIGHT = 34  # 0..1, weight of this innovation in the mean innovation
-IN_BIAS_FREE = 35  # 1 while a marker makes the GNSS bias observable, else 0
-IN_AGREES = 36  # 1 while measured position and velocity tell the same motion, else 0
-ODOMETRY_INPUTS = 37
-IN_MEASURED = slice(13, 29)  # quaternion, position, velocity, use, correlation
-IN_WEIGHTS = slice(32, 37)  # interval, matching weight, mean weight, bias free, agrees
+IN_QUATERNION = slice(14, 18)  # measured, body to world
+IN_POSITION = slice(18, 21)  # m, measured
+IN_VELOCITY = slice(21, 24)  # m/s, measured, world
+IN_USE = slice(24, 27)  # 1 = the sensor has something to say, in the order of SENSORS
+IN_CORRELATION = slice(27, 30)  # factor on the variance for the correlation in time, in the order of SENSORS
+IN_VARIANCE = slice(30, 33)  # configured variances (rad^2, m^2, m^2/s^2)
+IN_INTERVAL = 33  # s since the sample before
+IN_MATCHING_WEIGHT = 34  # 0..1, weight of this innovation in the matched covariance
+IN_MEAN_WEIGHT = 35  # 0..1, weight of this innovation in the mean innovation
+IN_BIAS_FREE = 36  # 1 while a marker makes the GNSS bias observable, else 0
+IN_AGREES = 37  # 1 while measured position and velocity tell the same motion, else 0
+ODOMETRY_INPUTS = 38
+IN_MEASURED = slice(14, 30)  # quaternion, position, velocity, use, correlation
+IN_WEIGHTS = slice(33, 38)  # interval, matching weight, mean weight, bias free, agrees
 
 # Output of an odometry step beside the new packed state.
 OUT_NIS = slice(0, 3)  # normalised innovation squared

@@ -134,6 +134,12 @@ class Stepper:
             noise.acceleration_density**2 if moment.airborne else GROUND_ACCELERATION_DENSITY**2,
             noise.attitude_density**2 if known else UNKNOWN_TURN_DENSITY**2,
         )
+        seen = moment.airborne and self._sees_a_marker(moment, end_s)
+        self._inputs[s.IN_WANDER_DENSITY] = noise.velocity_wander_density**2 if seen else 0.0
+
+    @staticmethod
+    def _sees_a_marker(moment: Moment, time_s: float) -> bool:
+        return any(time_s - sighted_s < MARKER_FRESH_S for sighted_s in moment.sighted_s)
 
     def _predicted(self, moment: Moment, time_s: float, rate: tuple[float, ...]) -> Array:
         """Packed state predicted to `time_s`, in steps of at most MAX_STEP_S."""
@@ -159,7 +165,7 @@ class Stepper:
         self._prepare_prediction(before, last_s, time_s, rate)
         interval_s = max(time_s - before.odometry_s, SHORTEST_INTERVAL_S)
         counted_s = min(interval_s, LONGEST_INTERVAL_S)
-        bias_free = self.bias_free or any(time_s - sighted_s < MARKER_FRESH_S for sighted_s in before.sighted_s)
+        bias_free = self.bias_free or self._sees_a_marker(before, time_s)
         inputs[s.IN_MEASURED] = (
             *odometry.quaternion,
             *odometry.position,

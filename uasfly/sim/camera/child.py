@@ -18,7 +18,7 @@ from uasfly.errors import UasflyError
 from uasfly.sim.camera.feed import read_exposure
 from uasfly.sim.camera.mjpeg import MjpegServer
 from uasfly.sim.camera.renderer import Renderer
-from uasfly.sim.camera.settings import CameraSettings
+from uasfly.sim.camera.settings import BundlePlacement, CameraSettings
 from uasfly.sim.camera.shutter import Exposure
 
 NICENESS = 5  # a camera costs its vehicle's computer nothing
@@ -75,6 +75,10 @@ def main() -> None:
             Bundle.model_validate_json(job["bundle"]),
             settings,
             np.random.default_rng([job["seed"], 12]),
+            [
+                (Bundle.model_validate_json(one), BundlePlacement.model_validate_json(place))
+                for one, place in job["others"]
+            ],
         )
         server = MjpegServer(job["port"])
     except UasflyError as error:

@@ -13,6 +13,7 @@ import select
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
@@ -22,7 +23,7 @@ from uasfly.bundle import Bundle
 from uasfly.camera import Camera
 from uasfly.errors import LinkError
 from uasfly.sim.camera.feed import ExposureFeed
-from uasfly.sim.camera.settings import CameraSettings
+from uasfly.sim.camera.settings import BundlePlacement, CameraSettings
 from uasfly.sim.camera.shutter import Shutter
 
 READY_TIMEOUT_S = 60.0
@@ -36,6 +37,7 @@ class CameraProcess:
         camera: its file. bundle: what it looks at. settings: the scenario's section `camera`.
         seed: of everything random.
         port: TCP port of the stream, 0 for any that is free.
+        others: more bundles and where they are.
 
     Raises:
         LinkError: it could not start.
@@ -45,10 +47,19 @@ class CameraProcess:
         url: what a client opens.
     """
 
-    def __init__(self, camera: Camera, bundle: Bundle, settings: CameraSettings, seed: int, port: int = 0) -> None:
+    def __init__(
+        self,
+        camera: Camera,
+        bundle: Bundle,
+        settings: CameraSettings,
+        seed: int,
+        port: int = 0,
+        others: Sequence[tuple[Bundle, BundlePlacement]] = (),
+    ) -> None:
         job = {
             "camera": camera.model_dump_json(exclude_none=True),
             "bundle": bundle.model_dump_json(exclude_none=True),
+            "others": [(one.model_dump_json(exclude_none=True), place.model_dump_json()) for one, place in others],
             "settings": settings.model_dump_json(),
             "seed": seed,
             "port": port,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from uasfly.sim.camera.optics import Image, Lens, Sensor
 from uasfly.sim.camera.placement import PlacedBundle
 from uasfly.sim.camera.printed import print_markers
 from uasfly.sim.camera.rays import COARSE_PX, RayTable
-from uasfly.sim.camera.settings import CameraSettings
+from uasfly.sim.camera.settings import BundlePlacement, CameraSettings
 
 _HORIZON_1_M = 1e-3  # further than a kilometre, or behind the camera, there is no page
 _FLAT = np.diag((1.0, 1.0, 0.0))  # (x, y, 1) to a point of the page [m]
@@ -30,21 +31,31 @@ class Renderer:
         bundle: what is seen.
         settings: where it is, and what it looks like.
         rng: draws background and noise.
+        others: more bundles and where they are; nothing hides anything, the later ones are in front.
 
     Raises:
         UasflyError: the bundle's family cannot be printed.
     """
 
-    def __init__(self, camera: Camera, bundle: Bundle, settings: CameraSettings, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        camera: Camera,
+        bundle: Bundle,
+        settings: CameraSettings,
+        rng: np.random.Generator,
+        others: Sequence[tuple[Bundle, BundlePlacement]] = (),
+    ) -> None:
         exposure_s = camera.exposure_s if settings.exposure_s is None else settings.exposure_s
         self._rays = RayTable(camera)
-        self._markers = print_markers(bundle, settings.ink, settings.paper)
         self._painter = MarkerPainter(self._rays, exposure_s, camera.rolling_shutter_s)
         self._background = BackgroundTexture(settings.background, rng)
         self._exposure_s = exposure_s
         self._lens = Lens(camera, settings, self._rays.valid)
         self._sensor = Sensor(settings.noise, (camera.height_px, camera.width_px), rng)
         self.placed = PlacedBundle(settings.bundle)
+        self._printed = [(self.placed, print_markers(bundle, settings.ink, settings.paper))]
+        for other, placement in others:
+            self._printed.append((PlacedBundle(placement), print_markers(other, settings.ink, settings.paper)))
 
     def render(self, motion: CameraMotion, since_s: float = -math.inf) -> Image:
         """A frame (height, width), gray.
@@ -53,10 +64,11 @@ class Renderer:
             motion: of the camera at mid-exposure (of the middle row, where the shutter rolls).
             since_s: time on the schedule's clock; negative before it runs.
         """
-        position, bundle_to_world = self.placed.pose(since_s)
         picture = self._behind(motion)
-        for marker in self._markers:
-            self._painter.paint(picture, marker, motion, position, bundle_to_world)
+        for placed, markers in self._printed:
+            position, bundle_to_world = placed.pose(since_s)
+            for marker in markers:
+                self._painter.paint(picture, marker, motion, position, bundle_to_world)
         return self._sensor.read_out(self._lens.apply(picture, since_s))
 
     def _behind(self, motion: CameraMotion) -> NDArray[np.float32]:

@@ -34,6 +34,9 @@ class BundlePlacement(FileModel):
     On a wall the page stands upright and faces `facing_deg`; on the floor it looks up and its upper edge points there.
     """
 
+    name: Annotated[
+        str | None, Field(min_length=1, description="bundle file or shipped name; the one looked for when not given")
+    ] = None
     on: Literal["wall", "floor"] = "floor"
     position_m: Annotated[Vector, Field(description="world: x east, y north, z up, from the take-off point")]
     facing_deg: Annotated[Finite, Field(description="0 = +x (east), 90 = +y (north)")] = 0.0
@@ -103,13 +106,25 @@ class Silence(FileModel):
 class CameraSettings(FileModel):
     """The simulated camera in a scenario. Scheduled times count from the first offboard, or from the start (`boot`)."""
 
-    bundle: BundlePlacement
+    bundle: Annotated[BundlePlacement, Field(description="the first bundle; the background lies in its plane")]
+    others: Annotated[
+        tuple[BundlePlacement, ...], Field(max_length=10, description="more bundles, each with its name")
+    ] = ()
     rate_hz: Annotated[float, Field(ge=0.1, le=240.0)] = 30.0
     latency_s: Annotated[
         float | None, Field(ge=0.0, le=2.0, description="arrival minus mid-exposure; the camera file's when not given")
     ] = None
     jitter_s: Annotated[float, Field(ge=0.0, le=1.0, description="extra latency, uniform in 0..jitter_s")] = 0.0
     drop_share: Annotated[Fraction, Field(description="share of the frames that never arrive")] = 0.0
+    detection_s: Annotated[
+        float,
+        Field(
+            ge=0.0,
+            le=2.0,
+            description="time the vehicle's computer takes for a frame, in rehearsals: what comes meanwhile waits, and "
+            "the newest of it is looked at next",
+        ),
+    ] = 0.03
     exposure_s: Annotated[
         float | None, Field(ge=0.0, le=0.2, description="time the shutter is open; the camera file's when not given")
     ] = None
@@ -127,6 +142,12 @@ class CameraSettings(FileModel):
         Vector, Field(description="rotation of the true mounting against the camera file's, about the camera's axes")
     ] = (0.0, 0.0, 0.0)
     mounting_error_m: Annotated[Vector, Field(description="its offset, body axes")] = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _others_have_names(self) -> CameraSettings:
+        if any(other.name is None for other in self.others):
+            raise ValueError("others: expected a name (of a bundle file) for each of them, found one without")
+        return self
 
     @model_validator(mode="after")
     def _paper_is_brighter_than_ink(self) -> CameraSettings:

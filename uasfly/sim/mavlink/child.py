@@ -16,6 +16,7 @@ from uasfly.bundle import Bundle
 from uasfly.camera import Camera
 from uasfly.errors import UasflyError
 from uasfly.sim.camera.process import CameraProcess
+from uasfly.sim.camera.settings import BundlePlacement
 from uasfly.sim.fault_lines import FaultLines
 from uasfly.sim.faults import Fault
 from uasfly.sim.mavlink.server import serve
@@ -67,7 +68,10 @@ def _start_camera(job: dict[str, Any]) -> CameraProcess | None:
     if job["camera"] is None or scenario.camera is None:
         return None
     camera, bundle = Camera.model_validate_json(job["camera"]), Bundle.model_validate_json(job["bundle"])
-    return CameraProcess(camera, bundle, scenario.camera, job["seed"], job["camera_port"])
+    others = [
+        (Bundle.model_validate_json(one), BundlePlacement.model_validate_json(place)) for one, place in job["others"]
+    ]
+    return CameraProcess(camera, bundle, scenario.camera, job["seed"], job["camera_port"], others)
 
 
 def _say_ready(camera: CameraProcess | None, local_port: int) -> None:

@@ -16,12 +16,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from types import TracebackType
 from typing import IO, Self
 
 from uasfly.bundle import Bundle
 from uasfly.camera import Camera
 from uasfly.errors import LinkError
+from uasfly.sim.camera.settings import BundlePlacement
 from uasfly.sim.faults import Fault
 from uasfly.sim.mavlink.channel import DEFAULT_REMOTE
 from uasfly.sim.mavlink.server import ServerReport
@@ -144,6 +146,7 @@ def start_process(
     camera: Camera | None = None,
     bundle: Bundle | None = None,
     camera_port: int = 0,
+    others: Sequence[tuple[Bundle, BundlePlacement]] = (),
 ) -> SimulatedVehicleProcess:
     """Start a simulated vehicle in a process of its own and wait until it answers.
 
@@ -164,6 +167,7 @@ def start_process(
         camera: its camera, served as an MJPEG stream where the scenario has a section `camera`.
         bundle: what the camera looks at; needed with `camera`.
         camera_port: TCP port of that stream, 0 for any that is free.
+        others: more bundles and where they are.
 
     Raises:
         LinkError: it could not start; the text says why.
@@ -181,6 +185,7 @@ def start_process(
         "camera": None if camera is None or bundle is None else camera.model_dump_json(exclude_none=True),
         "bundle": None if bundle is None else bundle.model_dump_json(exclude_none=True),
         "camera_port": camera_port,
+        "others": [(one.model_dump_json(exclude_none=True), place.model_dump_json()) for one, place in others],
     }
     complaints = tempfile.TemporaryFile()  # noqa: SIM115 - the handle reads it as long as it lives
     process = subprocess.Popen(
