@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
@@ -20,6 +21,7 @@ from uasfly.vision.bundle_survey.start import square_corners
 from uasfly.vision.detectors import Detection
 from uasfly.vision.pose import Pose
 from uasfly.vision.rotations import right_jacobians, rotations, skews
+from uasfly.vision.square import quaternion_of
 
 _HUBER = 3.0  # residuals beyond, in sigmas, count linearly
 _FAR = 1e4  # residual of a corner behind the camera, in sigmas
@@ -189,7 +191,7 @@ class Adjustment:
         by_turn = -by_place @ turned[marker][:, None] @ skews(self._local) @ right[marker][:, None]
         return residuals, np.concatenate((slope, by_view, by_place, by_turn), axis=3)
 
-    def _columns(self) -> tuple[Array, Array, Array]:
+    def _columns(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
         """Row, column and whether it is one of the problem's, of each entry of the blocks (n, 4, 2, 12)."""
         count = len(self._view)
         rows = np.repeat(np.arange(8 * count), 12)
@@ -198,7 +200,7 @@ class Adjustment:
         each = np.concatenate((first[:, None] + np.arange(6), second[:, None] + np.arange(6)), axis=1)
         columns = np.repeat(each, 8, axis=0).reshape(-1)
         kept = np.repeat(np.column_stack((np.ones((count, 6)), np.repeat((self._marker > 0)[:, None], 6, 1))), 8, 0)
-        return rows, columns, kept.reshape(-1).astype(bool)
+        return rows.astype(np.intp), columns.astype(np.intp), kept.reshape(-1).astype(np.bool_)
 
 
 def _huber(residuals: Array) -> float:
@@ -207,6 +209,4 @@ def _huber(residuals: Array) -> float:
 
 
 def _pose(position: Array, rotation: Array) -> Pose:
-    from uasfly.vision.square import quaternion_of
-
     return Pose(position, quaternion_of(rotation))

@@ -163,7 +163,7 @@ class _Rounds:
         if len(self._markers) < 2 or len(self._views) < LEAST_VIEWS:
             raise UasflyError(
                 f"the survey has too little left that fits together: {len(self._markers)} markers in "
-                f"{len(self._views)} pictures; expected 2 in {LEAST_VIEWS}. Look at --size, the camera file and sharpness"
+                f"{len(self._views)} pictures; expected 2 in {LEAST_VIEWS}. Look at --size, camera file and sharpness"
                 + "".join(f"\n{text}" for text in self._rejected[:10])
             )
 
