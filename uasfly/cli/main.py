@@ -7,7 +7,7 @@ import sys
 import typer
 
 from uasfly import __version__
-from uasfly.cli import bench, check, faults, fly, markers, preflight, rehearse, sim
+from uasfly.cli import bench, calibrate, check, faults, fly, markers, preflight, rehearse, sim
 
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
@@ -43,6 +43,7 @@ sim.register(app)
 faults.register(app)
 bench.register(app)
 markers.register(app)
+calibrate.register(app)
 
 
 def main() -> None:

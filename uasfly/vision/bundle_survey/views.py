@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -14,11 +13,10 @@ from uasfly.errors import FileError
 from uasfly.messages import Array
 from uasfly.vision.consistency import implausible
 from uasfly.vision.detectors import Detection, Detector
-from uasfly.vision.pictures import pictures
+from uasfly.vision.pictures import pictures, step_of
 from uasfly.vision.seek import detect_markers
 from uasfly.vision.square import square_poses
 
-VIDEO_STEP = 5  # of a video's frames one in so many is looked at: neighbours say the same
 _NEW_MARKER = 0.25  # how much a marker more or less tells views apart, as a shift by this share of the picture
 _SAME = 0.015  # views that differ by less, as a share of the picture's diagonal, are one
 
@@ -47,13 +45,13 @@ def look(
         camera: the lens.
         sizes: sides [m] by id, where they differ from `size_m`.
         size_m: side of the others.
-        step: one frame of a video in so many; None for VIDEO_STEP.
+        step: one frame of a video in so many; see `step_of`.
 
     Raises:
         FileError: a source cannot be read, or a picture is not of the camera's size.
     """
     for source in sources:
-        every = (step or VIDEO_STEP) if _is_video(source) else 1
+        every = step_of(source, step)
         for number, (name, image) in enumerate(pictures(source)):
             if number % every:
                 continue
@@ -62,11 +60,6 @@ def look(
                 size = f"{expected[0]} x {expected[1]} px (camera {camera.name}), found {found[0]} x {found[1]}"
                 raise FileError(name, [f"expected {size}; give the camera file of this size"])
             yield name, _view(name, detect_markers(image, detector, camera), camera, sizes, size_m)
-
-
-def _is_video(source: str) -> bool:
-    path = Path(source)
-    return not path.is_dir() and path.suffix.lower() not in {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}
 
 
 def _view(
