@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,6 +18,7 @@ LEAST_FOR_HOLD_OUT = 2 * LEAST_VIEWS
 _ROUNDS = 6
 _VIEW_OUTLIER, _CORNER_OUTLIER = 3.0, 5.0  # times the usual
 _LEAST_OUTLIER_PX = 0.3
+_FISHEYE_STARTS = (1.0 / math.pi, 0.45, 0.6, 0.85)  # focal length in picture widths
 _FOCAL_SHARE = 0.02  # a focal length whose sigma is larger is not determined
 
 
@@ -121,14 +122,7 @@ def _fit(views: list[BoardView], size: tuple[int, int], model: LensModel) -> tup
     criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-10)
     try:
         if model == "fisheye":
-            focal = max(size) / math.pi
-            start = np.array(((focal, 0.0, 0.5 * size[0]), (0.0, focal, 0.5 * size[1]), (0.0, 0.0, 1.0)))
-            flags = _fisheye_flags("CALIB_RECOMPUTE_EXTRINSIC", "CALIB_FIX_SKEW", "CALIB_USE_INTRINSIC_GUESS")
-            wide = [view.points.reshape(1, -1, 3) for view in views]  # it takes rows, not columns
-            seen = [view.pixels.reshape(1, -1, 2) for view in views]
-            _, matrix, coefficients, turned, at = cv2.fisheye.calibrate(
-                wide, seen, size, start, np.zeros((4, 1)), flags=flags, criteria=criteria
-            )
+            _, matrix, coefficients, turned, at = _fit_fisheye(views, size, criteria)
         else:
             flags = {"4": cv2.CALIB_FIX_K3, "5": 0, "8": cv2.CALIB_RATIONAL_MODEL}[model]
             _, matrix, coefficients, turned, at = cv2.calibrateCamera(
@@ -145,6 +139,32 @@ def _fit(views: list[BoardView], size: tuple[int, int], model: LensModel) -> tup
         (np.asarray(r, dtype=float).ravel(), np.asarray(t, dtype=float).ravel())
         for r, t in zip(turned, at, strict=True)
     ]
+
+
+def _fit_fisheye(views: list[BoardView], size: tuple[int, int], criteria: tuple[int, int, float]) -> Any:
+    """What OpenCV's fisheye calibration gives; it stays where it began from many starts, so the best of some is taken.
+
+    Raises:
+        cv2.error: from every start.
+    """
+    import cv2
+
+    flags = _fisheye_flags("CALIB_RECOMPUTE_EXTRINSIC", "CALIB_FIX_SKEW", "CALIB_USE_INTRINSIC_GUESS")
+    points = [view.points.reshape(1, -1, 3) for view in views]  # it takes rows, not columns
+    pixels = [view.pixels.reshape(1, -1, 2) for view in views]
+    results, problem = [], None
+    for share in _FISHEYE_STARTS:
+        focal = share * max(size)
+        start = np.array(((focal, 0.0, 0.5 * size[0]), (0.0, focal, 0.5 * size[1]), (0.0, 0.0, 1.0)))
+        try:
+            results.append(
+                cv2.fisheye.calibrate(points, pixels, size, start, np.zeros((4, 1)), flags=flags, criteria=criteria)
+            )
+        except cv2.error as error:
+            problem = error
+    if not results and problem is not None:
+        raise problem
+    return min(results, key=lambda result: result[0] if math.isfinite(result[0]) else math.inf)
 
 
 def _fisheye_flags(*names: str) -> int:
@@ -217,7 +237,10 @@ def _posed_residuals(lens: Lens, view: BoardView) -> Array:
 
     if lens.model == "fisheye":
         plane = cv2.fisheye.undistortPoints(view.pixels.reshape(-1, 1, 2), lens.matrix, lens.coefficients)
-        _, turned, at = cv2.solvePnP(view.points, plane, np.eye(3), None)
+        sane = (np.abs(plane.reshape(-1, 2)) < 10.0).all(axis=1)  # OpenCV's iteration gives -1e6 where it fails
+        if sane.sum() < 4:
+            return np.empty((0, 2))
+        _, turned, at = cv2.solvePnP(view.points[sane], plane[sane], np.eye(3), None)
     else:
         _, turned, at = cv2.solvePnP(view.points, view.pixels, lens.matrix, lens.coefficients)
     pose: Array = np.concatenate((turned.ravel(), at.ravel())).astype(np.float64)
