@@ -55,7 +55,24 @@ def render(
     pixels_per_m: float = 2000.0,
 ) -> np.ndarray:
     """Picture (h, w) uint8 of the bundle at rotation (3, 3), position (3,) [m] in camera axes."""
-    texture, (left, top) = board_texture(bundle, pixels_per_m)
+    texture, left_top = board_texture(bundle, pixels_per_m)
+    return render_plane(texture, left_top, camera, rotation, position, rng, blur_px, noise, supersampling, pixels_per_m)
+
+
+def render_plane(
+    texture: np.ndarray,
+    left_top: Array,
+    camera: Camera,
+    rotation: Array,
+    position: Array,
+    rng: np.random.Generator,
+    blur_px: float,
+    noise: float,
+    supersampling: int,
+    pixels_per_m: float,
+) -> np.ndarray:
+    """Picture (h, w) uint8 of a texture in the plane z = 0 (y up) whose left top edge is at `left_top` (2,) [m]."""
+    left, top = left_top
     height, width = texture.shape
     board = np.array(((0, 0), (width, 0), (width, height), (0, height))) / pixels_per_m
     outline = np.column_stack((left + board[:, 0], top - board[:, 1], np.zeros(4)))

@@ -1,4 +1,7 @@
-"""`uasfly markers print` and `uasfly markers detect`: markers on paper, and markers in pictures."""
+"""`uasfly markers print` and `uasfly markers detect`: markers on paper, and markers in pictures.
+
+`uasfly markers survey` is in `markers_survey`.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +11,19 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from uasfly.cli.markers_survey import survey
+
 if TYPE_CHECKING:
     from uasfly.bundle import Bundle
 
-markers = typer.Typer(no_args_is_help=True, help="Print fiducial markers to scale, and find them in pictures.")
+markers = typer.Typer(no_args_is_help=True, help="Print fiducial markers, find them in pictures, survey boards.")
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
     markers.command(name="print")(print_markers)
     markers.command(name="detect")(detect)
+    markers.command(name="survey")(survey)
     app.add_typer(markers, name="markers")
 
 
@@ -87,9 +93,9 @@ def detect(
     """
     from uasfly.vision.survey import Survey, make_survey
 
-    survey: Survey = make_survey(bundle, family, dictionary, camera, library, out)
-    records: list[dict[str, Any]] = [record for source in sources for record in survey.look_at(source, frames)]
-    summary = survey.summary(records)
+    looking: Survey = make_survey(bundle, family, dictionary, camera, library, out)
+    records: list[dict[str, Any]] = [record for source in sources for record in looking.look_at(source, frames)]
+    summary = looking.summary(records)
     if as_json:
         print(json.dumps({"pictures": records, "summary": summary}, indent=2))
     else:

@@ -63,3 +63,26 @@ class BenchProgress:
     def update(self, text: str, done: float) -> None:
         """Tell what is measured now, and the share that has been."""
         self._progress.update(self._task, completed=done, description=text)
+
+
+class PictureProgress:
+    """Shows on stderr how many pictures have been looked at; how many there are is not known beforehand."""
+
+    def __init__(self, name: str) -> None:
+        console = Console(stderr=True)
+        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed} pictures"))
+        self._progress = Progress(*columns, TimeElapsedColumn(), console=console, disable=not console.is_terminal)
+        self._task = self._progress.add_task(escape(name), total=None)
+
+    def __enter__(self) -> PictureProgress:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None
+    ) -> None:
+        self._progress.stop()
+
+    def advance(self, text: str) -> None:
+        """One more picture; what has been found so far."""
+        self._progress.update(self._task, advance=1, description=escape(text))

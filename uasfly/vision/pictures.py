@@ -10,6 +10,7 @@ import numpy as np
 from uasfly.errors import FileError
 from uasfly.vision.detectors import Image
 
+VIDEO_STEP = 5  # of a video's frames one in so many is looked at where spread views are wanted
 _PICTURES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp"}
 
 
@@ -38,6 +39,18 @@ def pictures(source: str, most: int | None = None) -> Iterator[tuple[str, Image]
         raise FileError(
             source, ["there is no such file; expected a picture, a folder, a video, a camera number or a URL"]
         )
+
+
+def step_of(source: str, step: int | None) -> int:
+    """One in so many pictures of a source is to be looked at: every one but of videos, where neighbours say the same.
+
+    Args:
+        source: as for `pictures`.
+        step: for videos; VIDEO_STEP where not given.
+    """
+    path = Path(source)
+    still = path.is_dir() or path.suffix.lower() in _PICTURES
+    return 1 if still else step or VIDEO_STEP
 
 
 def _read(path: Path) -> Image:
