@@ -19,6 +19,7 @@ REAL_TIME = (
     "drivers/test_preflight.py",
     "fuzz/",
     "link/",
+    "vision_sources/",
     "sim_mavlink/",
 )
 

@@ -86,7 +86,6 @@ def test_a_mission_by_a_bundle_has_a_camera_in_simulations() -> None:
     assert [bundle.name for bundle, _ in sight.scene.others] == ["floor_36h11"]
 
 
-@pytest.mark.slow
 def test_a_flight_over_mavlink_sees_its_bundle_in_the_cameras_stream(tmp_path: Path) -> None:
     """Vehicle, camera and detection in processes of their own: sightings come, with the time of their exposure."""
     log, summary = tmp_path / "flight.mcap", tmp_path / "summary.json"

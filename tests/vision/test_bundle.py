@@ -35,4 +35,4 @@ def test_an_id_stands_once_in_a_bundle() -> None:
 
 def test_bundles_are_shipped() -> None:
     """By these names."""
-    assert shipped_names("bundle") == ["four_36h11", "single_36h11"]
+    assert shipped_names("bundle") == ["floor_36h11", "four_36h11", "single_36h11"]
