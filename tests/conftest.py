@@ -17,6 +17,7 @@ REAL_TIME = (
     "drivers/test_live_faults.py",
     "drivers/test_metronome.py",
     "drivers/test_preflight.py",
+    "drivers/test_sight.py",
     "fuzz/",
     "link/",
     "vision_sources/",
