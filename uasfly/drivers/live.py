@@ -149,7 +149,8 @@ class _LiveFlight:
             self._pilot.announce(3, self._writer.problem)
         solve_ms = None if result.control is None else result.control.solve_ms
         self.summary.timed(solve_ms, cycle_ms)
-        self.summary.cycle(result.status, samples, marker_datum(self._sight, self._pilot.observer.moment))
+        datum = None if self._sight is None else marker_datum(self._sight, self._pilot.observer.moment)
+        self.summary.cycle(result.status, samples, datum)
         self.summary.preflight(result.preflight)
         self._tell_ground(result.status)
         self._record(result, samples)
