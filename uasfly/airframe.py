@@ -144,8 +144,8 @@ class ObserverNoise(FileModel):
     gnss_bias_density: Annotated[Positive, Field(description="[m/sqrt(s)] random walk of the GNSS bias")]
     velocity_wander_density: Annotated[
         NonNegative,
-        Field(description="[m/sqrt(s)] how the integral of PX4's velocity walks away from a marker that is seen"),
-    ] = 0.02
+        Field(description="[m/sqrt(s)] how the integral of PX4's velocity walks away, over many seconds"),
+    ] = 0.08
     position_sigma_m: Positive
     attitude_sigma_rad: Positive
     velocity_sigma_m_s: Positive

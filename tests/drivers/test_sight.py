@@ -36,7 +36,7 @@ def sightings(log: Path) -> list[MarkerSample]:
 
 
 def test_a_bundle_in_sight_makes_the_estimate_good_where_gnss_is_not() -> None:
-    """GNSS walks away by decimetres, markers hold the estimate to centimetres; sightings are late, as they must be."""
+    """GNSS walks away by decimetres, markers hold the estimate to centimetres; sightings are as late as must be."""
     seen, blind = rehearse(plan("model")), rehearse(plan("none"))
     assert seen["outcome"] == blind["outcome"] == "completed"
     assert seen["camera"] == "vga (noise model)"

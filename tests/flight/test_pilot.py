@@ -77,6 +77,10 @@ class FakeObserver:
         """Check what the filter would divide by."""
         assert k_thrust_m_s2 > 0.0
 
+    def take_moved(self) -> list[tuple[int, float]]:
+        """Nothing moves."""
+        return []
+
     def diagnose(self, time_s: float, window_s: float) -> Diagnosis:
         """All is well."""
         return Diagnosis(np.full(3, 0.01), np.full(3, 0.01), {}, {}, 0.0, -math.inf, 0.0, True, 0.0, 0)

@@ -102,7 +102,8 @@ def load_sight(options: SightOptions, scenario: Scenario | None, mission_bundle:
         UasflyError: a file or a combination that cannot be used.
     """
     asked = options.camera
-    if asked == NONE or (asked is None and mission_bundle is None):
+    nothing_there = scenario is not None and scenario.camera is None
+    if asked == NONE or (asked is None and (mission_bundle is None or nothing_there)):
         if options.bundles or options.source:
             raise UasflyError("--bundle and --camera-source need a camera: add --camera NAME|FILE")
         return None
@@ -110,7 +111,7 @@ def load_sight(options: SightOptions, scenario: Scenario | None, mission_bundle:
     name = None if asked is None else asked.partition(":")[2] or None if modelled else asked
     if scenario is None:
         _refuse_on_a_real_vehicle(options, modelled, name)
-    elif scenario.camera is None:
+    elif nothing_there:
         raise UasflyError(
             f"--camera: scenario {scenario.name} does not say where a bundle is; take one with a section camera "
             "(gnss_degraded), or add --set 'scenario.camera.bundle.position_m=[0, 0, 0]'"

@@ -98,6 +98,7 @@ class Pilot:
         self.monitors = Monitors(mission, airframe)
         self.course = Course(mission, airframe.limits)
         self._guide: MarkerGuide | None = None
+        observer.retakes_moved = mission.marker is None  # else it is the guide's to say
         if mission.marker is not None:
             self._guide = MarkerGuide(mission.marker, marker_id, airframe.limits.yaw_rate_rad_s)
         self._meter = AuthorityMeter(airframe.limits, airframe.model, mission.transition.speed_m_s)
@@ -149,6 +150,8 @@ class Pilot:
             self._note_places(estimate)
 
         sequencer = self.sequencer
+        for number, away_m in self.observer.take_moved():
+            self.announce(4, f"bundle {number} is seen {away_m:.2f} m from where it was: moved; it is taken anew")
         requests = sequencer.step(time_s, self.view, estimate, self.course.done(time_s))
         checks = self._check_before_flight(time_s, samples, estimate)
         setpoint, control, authority = None, None, None

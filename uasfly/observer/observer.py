@@ -27,6 +27,7 @@ from uasfly.observer.agreement import Agreement
 from uasfly.observer.diagnosis import Diagnosis, Journal
 from uasfly.observer.door import Odometry, Sighting, checked_odometry, checked_sighting
 from uasfly.observer.expected import ExpectedMarker, expected_marker
+from uasfly.observer.glide import Glide
 from uasfly.observer.gnss import DriftWatch, Outage
 from uasfly.observer.moment import Moment, Verdict
 from uasfly.observer.sightings import MarkerEstimate, SightingLog, marker_estimate
@@ -39,6 +40,8 @@ TICK_BEHIND_S = 0.1  # and the filter itself to this long before now
 JUMP_AHEAD_S = 1.0  # a sample further ahead of the filter than this needs a second one to be believed
 LONGEST_GAP_S = 5.0  # a longer gap is not bridged: the filter starts again
 EXPECTED_WITHIN_S = 0.5  # of where the filter stands: beyond it nothing is said about where a marker is to be seen
+GLIDE_AFTER_S, GLIDE_FOR_S = 1.0, 5.0  # without a sighting for so long, what the next ones correct is told gradually
+MOVED_AFTER, MOVED_M = 5, 0.15  # so many sightings refused in a row, that far away: the marker has been moved
 RESTART_AFTER_S = 1.0  # samples that are all too old for this long: the clock was set back, start again
 
 
@@ -72,6 +75,11 @@ class Observer:
         airframe: model and noise.
         prepared_markers: for how many markers the functions are compiled at once; more are generated in flight when
             seen, which takes some tenths of a second each.
+
+    Attributes:
+        counters: what was refused. statistics: of the last innovation, by sensor.
+        retakes_moved: whether a marker that has been moved is forgotten here, and taken anew where it is seen then; it
+            is otherwise left to whoever flies by it (`marker`, `trust`, `forget`).
     """
 
     def __init__(self, airframe: Airframe, prepared_markers: int = 0) -> None:
@@ -87,6 +95,11 @@ class Observer:
         self._sightings = SightingLog()
         self._drift = DriftWatch(airframe.observer.gnss_bias_density)
         self._agreement = Agreement()
+        self._glide = Glide()
+        self._regained_s = -math.inf
+        self._moved: list[tuple[int, float]] = []
+        self._refused: dict[int, int] = {}
+        self.retakes_moved = False
         self._outage = Outage(airframe.observer.velocity_sigma_m_s)
         self._in_air = False
         self._in_air_s = -math.inf
@@ -144,10 +157,12 @@ class Observer:
             if time_s - timeline.newest.time_s > SILENT_AFTER_S:
                 timeline.append(time_s - TICK_BEHIND_S, None, self._in_air)
             moment, _ = self._stepper.advance(timeline.newest, time_s, None, self._in_air)
-            core = moment.packed[: s.CORE_NOMINAL]
+            core = moment.packed[: s.CORE_NOMINAL].copy()
         else:
             moment = timeline.at(time_s)
             core = self._stepper.extrapolated(moment, max(time_s, moment.time_s))
+        if self._glide.active(time_s):
+            core[s.POSITION] += self._glide.offset(time_s)
         layout = moment.layout
         diagonal = slice(layout.covariance.start, layout.covariance.stop, layout.errors + 1)
         sigmas = np.sqrt(moment.packed[diagonal])
@@ -206,6 +221,11 @@ class Observer:
             self._timeline.forget(marker_id)
         self._sightings.forget(marker_id)
 
+    def take_moved(self) -> list[tuple[int, float]]:
+        """Markers that have been moved since the last call, and how far [m] each was away from its place."""
+        moved, self._moved = self._moved, []
+        return moved
+
     @property
     def moment(self) -> Moment | None:
         """The filter where it stands (nominal state, markers, time); None before the first odometry sample."""
@@ -248,19 +268,45 @@ class Observer:
             self.counters.duplicates += 1
         else:
             self._dropped_from_s = None
-            if time_s >= newest_s:
-                if isinstance(measured, Odometry):
-                    self._agreement.look(measured, timeline.newest.position_sigma_m)
-                    self._stepper.agrees = self._agreement.agrees
+            if isinstance(measured, Sighting):
+                self._sight(timeline, measured)
+            elif time_s >= newest_s:
+                self._agreement.look(measured, timeline.newest.position_sigma_m)
+                self._stepper.agrees = self._agreement.agrees
                 verdicts = timeline.append(time_s, measured, self._in_air)
                 self._note(measured, verdicts)
-                if isinstance(measured, Odometry):
-                    self._drift.look(measured, verdicts)
-                    self._stepper.bias_free = self._drift.runs_away
-                    self._journal.follow(time_s, timeline.newest)
+                self._drift.look(measured, verdicts)
+                self._stepper.bias_free = self._drift.runs_away
+                self._journal.follow(time_s, timeline.newest)
             else:
                 self.counters.late += 1
                 self._note(measured, timeline.insert(measured))
+
+    def _sight(self, timeline: Timeline, sighting: Sighting) -> None:
+        """A sighting, mostly late; the first after a while may move the filter, and what is told then glides there."""
+        before = timeline.newest
+        if sighting.time_s >= before.time_s:
+            verdicts = timeline.append(sighting.time_s, sighting, self._in_air)
+        else:
+            self.counters.late += 1
+            verdicts = timeline.insert(sighting)
+        self._note(sighting, verdicts)
+        after = timeline.newest
+        if before.sighted_s and sighting.time_s - max(before.sighted_s) > GLIDE_AFTER_S:
+            self._regained_s = sighting.time_s
+        if sighting.time_s - self._regained_s < GLIDE_FOR_S:
+            was = self._stepper.extrapolated(before, after.time_s)[s.POSITION]
+            self._glide.stepped(after.time_s, after.packed[s.POSITION] - was)
+        if self.retakes_moved and verdicts:
+            self._look_for_move(sighting.marker_id, verdicts[0])
+
+    def _look_for_move(self, marker_id: int, verdict: Verdict) -> None:
+        refused = 0 if verdict.accepted or verdict.away_m < MOVED_M else self._refused.get(marker_id, 0) + 1
+        self._refused[marker_id] = refused
+        if refused >= MOVED_AFTER:
+            self._refused[marker_id] = 0
+            self._moved.append((marker_id, verdict.away_m))
+            self.forget(marker_id)
 
     def _is_confirmed(self, measured: Odometry | Sighting) -> bool:
         """Whether a sample far ahead is believed: one alone is a wrong time stamp, a second soon after confirms it."""

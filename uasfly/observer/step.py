@@ -25,7 +25,11 @@ RATE_VALID_S = 0.15  # after this long without telemetry the turn of the vehicle
 UNKNOWN_TURN_DENSITY = 0.3  # rad/s/sqrt(Hz), attitude noise while it is
 GROUND_ACCELERATION_DENSITY = 1.0  # m/s^2/sqrt(Hz): on the ground the model knows no acceleration
 INITIAL_FORCE_SIGMA = 1.0  # m/s^2, before anything is known of the wind (P0 of Kalaitzakis 2023)
-MARKER_FRESH_S = 1.0  # for this long after an accepted sighting the GNSS bias counts as observable
+# For this long after an accepted sighting the GNSS bias counts as observable: nothing but time makes position and bias
+# less known, the velocity's integral beside the position with its bias tells how they part.
+MARKER_FRESH_S = 20.0
+WANDER_TIME_S = 4.0  # in which an error of PX4's velocity forgets itself (its own simulator)
+LEAST_AGE_S = 0.2  # of a sighting: with fewer the filter would take the velocity's errors for the marker's
 MEAN_TIME_S = 0.25  # time constant of the mean innovation that tells a jump from noise
 RUNAWAY_FACTOR = 100.0  # on the variance of the GNSS bias's walk, while GNSS runs away
 _NO_RATE = (0.0, 0.0, 0.0)
@@ -134,8 +138,21 @@ class Stepper:
             noise.acceleration_density**2 if moment.airborne else GROUND_ACCELERATION_DENSITY**2,
             noise.attitude_density**2 if known else UNKNOWN_TURN_DENSITY**2,
         )
-        seen = moment.airborne and self._sees_a_marker(moment, end_s)
-        self._inputs[s.IN_WANDER_DENSITY] = noise.velocity_wander_density**2 if seen else 0.0
+        self._inputs[s.IN_WANDER_DENSITY] = self._wander_variance(moment, end_s) if moment.airborne else 0.0
+
+    def _wander_variance(self, moment: Moment, time_s: float) -> float:
+        """Density [m^2/s] with which the velocity's integral walks away from a marker that was just seen; 0 without.
+
+        An error of the velocity of variance c that forgets itself in tau makes the integral's variance grow with
+        2 c tau (1 - exp(-t / tau)) at the time t since the last sighting: slowly first, as a random walk in the end.
+        """
+        if not moment.sighted_s:
+            return 0.0
+        age_s = time_s - max(moment.sighted_s)
+        if age_s >= MARKER_FRESH_S:
+            return 0.0
+        grown = 1.0 - math.exp(-max(age_s, LEAST_AGE_S) / WANDER_TIME_S)
+        return self._noise.velocity_wander_density**2 * grown
 
     @staticmethod
     def _sees_a_marker(moment: Moment, time_s: float) -> bool:
