@@ -1,1 +1,1 @@
-"""Calibration of a camera: its lens from pictures of a ChArUco board, its mounting from a log."""
+"""Calibration of a camera: its lens, from pictures of a ChArUco board."""

@@ -28,7 +28,7 @@ fy: 600.0
 cx: 319.5
 cy: 239.5
 distortion: []
-# A guess: at the body's origin, looking ahead. Measure it, and refine it from a log (uasfly calibrate mounting).
+# A guess: at the body's origin, looking ahead. Measure it.
 transform_camera_to_body:
   position_m: [0.0, 0.0, 0.0]
   rpy_deg: [-90.0, 0.0, -90.0]  # ahead; straight down with the picture's top to the nose is [180, 0, -90]
