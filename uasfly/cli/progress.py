@@ -1,31 +1,29 @@
-"""A progress bar for rehearsals on a terminal; nothing where there is none."""
+"""Progress bars on a terminal; nothing where there is none."""
 
 from __future__ import annotations
 
 import types
+from typing import Self
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
 
 from uasfly.messages import Status
 
 CYCLES_PER_UPDATE = 50
 
 
-class RehearsalProgress:
-    """Shows phase and progress of a rehearsal on stderr."""
+class _Bar:
+    """One task on stderr: text, bar, what `columns` tell, and the time; shown while entered."""
 
-    def __init__(self, name: str) -> None:
-        """Prepare the bar for a mission of this name."""
+    def __init__(self, text: str, *columns: ProgressColumn, total: float | None = 1.0) -> None:
         console = Console(stderr=True)
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
-        self._progress = Progress(*columns, TimeElapsedColumn(), console=console, disable=not console.is_terminal)
-        self._name = escape(name)
-        self._task = self._progress.add_task(self._name, total=1.0)
-        self._cycles = 0
+        shown = (TextColumn("{task.description}"), BarColumn(), *columns, TimeElapsedColumn())
+        self._progress = Progress(*shown, console=console, disable=not console.is_terminal)
+        self._task = self._progress.add_task(text, total=total)
 
-    def __enter__(self) -> RehearsalProgress:
+    def __enter__(self) -> Self:
         self._progress.start()
         return self
 
@@ -33,6 +31,16 @@ class RehearsalProgress:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None
     ) -> None:
         self._progress.stop()
+
+
+class RehearsalProgress(_Bar):
+    """Shows phase and progress of a rehearsal."""
+
+    def __init__(self, name: str) -> None:
+        """Prepare the bar for a mission of this name."""
+        self._name = escape(name)
+        super().__init__(self._name, TextColumn("{task.percentage:3.0f} %"))
+        self._cycles = 0
 
     def update(self, status: Status) -> None:
         """Take in a step's status; the bar moves once a simulated second."""
@@ -42,46 +50,22 @@ class RehearsalProgress:
             self._progress.update(self._task, completed=status.progress, description=text)
 
 
-class BenchProgress:
-    """Shows on stderr what the bench is measuring."""
+class BenchProgress(_Bar):
+    """Shows what the bench is measuring."""
 
     def __init__(self) -> None:
-        console = Console(stderr=True)
-        columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-        self._progress = Progress(*columns, console=console, disable=not console.is_terminal)
-        self._task = self._progress.add_task("bench", total=1.0)
-
-    def __enter__(self) -> BenchProgress:
-        self._progress.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None
-    ) -> None:
-        self._progress.stop()
+        super().__init__("bench")
 
     def update(self, text: str, done: float) -> None:
         """Tell what is measured now, and the share that has been."""
         self._progress.update(self._task, completed=done, description=text)
 
 
-class PictureProgress:
-    """Shows on stderr how many pictures have been looked at; how many there are is not known beforehand."""
+class PictureProgress(_Bar):
+    """Shows how many pictures have been looked at; how many there are is not known beforehand."""
 
     def __init__(self, name: str) -> None:
-        console = Console(stderr=True)
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed} pictures"))
-        self._progress = Progress(*columns, TimeElapsedColumn(), console=console, disable=not console.is_terminal)
-        self._task = self._progress.add_task(escape(name), total=None)
-
-    def __enter__(self) -> PictureProgress:
-        self._progress.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None
-    ) -> None:
-        self._progress.stop()
+        super().__init__(escape(name), TextColumn("{task.completed} pictures"), total=None)
 
     def advance(self, text: str) -> None:
         """One more picture; what has been found so far."""
