@@ -13,7 +13,7 @@ from uasfly.sim.camera.motion import camera_motion
 from uasfly.sim.camera.noise_model import NoiseModelCamera
 from uasfly.sim.camera.renderer import Renderer
 from uasfly.sim.camera.settings import Background, Noise
-from uasfly.sim.camera.shutter import Exposure
+from uasfly.sim.camera.shutter import Arrivals, Exposure, Shutter
 from uasfly.vision.bundle_pose import solve_bundle
 from uasfly.vision.detectors import make_detector
 from uasfly.vision.mounting import marker_sample
@@ -130,14 +130,18 @@ def test_what_cannot_be_seen_gives_no_sample() -> None:
 def test_samples_arrive_late() -> None:
     """They come when their frames would, and are of the time of the exposure."""
     camera = views.camera(latency_s=0.1)
-    model = NoiseModelCamera(camera, views.four(), views.clean(rate_hz=20.0), np.random.default_rng(1))
+    settings = views.clean(rate_hz=20.0)
+    shutter = Shutter(camera, settings, np.random.default_rng(1))
+    model = NoiseModelCamera(camera, views.four(), settings, np.random.default_rng(2))
     body = [-0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     for step in range(1, 251):
-        model.shutter.watch(0.004 * step, body, None)
-    arrived = model.samples_until(1.0)
+        shutter.watch(0.004 * step, body, None)
+    arrived = Arrivals(shutter).until(1.0)
     assert len(arrived) == pytest.approx(18, abs=1)
-    for it in arrived:
-        assert it.sample is not None
-        assert it.sample.time_s == it.exposed_s
-        assert it.arrives_s - it.exposed_s == pytest.approx(0.1)
-    assert rotation_matrix(arrived[0].sample.quaternion_marker_to_body)[:, 2] == pytest.approx([-1, 0, 0], abs=0.1)
+    samples = [model.see(exposure) for exposure in arrived]
+    for seen, sample in zip(arrived, samples, strict=True):
+        assert sample is not None
+        assert sample.time_s == seen.exposed_s
+        assert seen.arrives_s - seen.exposed_s == pytest.approx(0.1)
+    assert samples[0] is not None
+    assert rotation_matrix(samples[0].quaternion_marker_to_body)[:, 2] == pytest.approx([-1, 0, 0], abs=0.1)

@@ -106,7 +106,7 @@ def test_the_simulated_camera_knows_nothing_of_vision() -> None:
     """Nor of observer and control: what detectors say of its pictures is no flattery; a scenario needs no OpenCV."""
     script = (
         "import sys, uasfly.sim.scenario; assert 'cv2' not in sys.modules\n"
-        "import uasfly.sim.camera.simulated_camera, uasfly.sim.camera.noise_model, uasfly.sim.camera.child\n"
+        "import uasfly.sim.camera.renderer, uasfly.sim.camera.noise_model, uasfly.sim.camera.child\n"
         "print(*(name for name in sys.modules if name.startswith('uasfly.')))"
     )
     output = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True, timeout=60)

@@ -11,9 +11,9 @@ from uasfly.files import find_file, load_file
 from uasfly.frames import quaternion_from_rotation_vector, rotation_matrix
 from uasfly.messages import Array, FlightMode
 from uasfly.sim.camera.mount import Mount
+from uasfly.sim.camera.renderer import Renderer
 from uasfly.sim.camera.settings import MountMotion
-from uasfly.sim.camera.shutter import Exposure, Shutter
-from uasfly.sim.camera.simulated_camera import SimulatedCamera
+from uasfly.sim.camera.shutter import Arrivals, Exposure, Shutter
 from uasfly.sim.camera.timing import FrameClock
 from uasfly.sim.plant import Plant
 from uasfly.sim.scenario import Scenario
@@ -132,11 +132,10 @@ def test_a_camera_on_a_vehicle_changes_nothing_of_its_flight() -> None:
     down = {"position_m": (0.0, 0.0, 0.0), "rpy_deg": (180.0, 0.0, -90.0)}
     settings = views.clean(bundle={"on": "floor", "position_m": (0.0, 0.0, 0.0)}, rate_hz=10.0)
     scenario = Scenario(name="test", camera=settings)
-    camera = SimulatedCamera(
-        views.camera(transform_camera_to_body=down, latency_s=0.1), views.single(), settings, np.random.default_rng(5)
-    )
+    camera = views.camera(transform_camera_to_body=down, latency_s=0.1)
+    shutter = Shutter(camera, settings, np.random.default_rng(5))
     ends = []
-    for watcher in (None, camera.shutter.watch):
+    for watcher in (None, shutter.watch):
         vehicle = SimulatedVehicle(plant, scenario, seed=1)
         vehicle.watcher = watcher
         vehicle.advance_to(4.0)
@@ -146,13 +145,15 @@ def test_a_camera_on_a_vehicle_changes_nothing_of_its_flight() -> None:
         vehicle.advance_to(11.0)
         ends.append(vehicle.truth().position_in_world)
     assert np.array_equal(*ends)
-    frames = camera.frames_until(11.0)
+    arrivals = Arrivals(shutter)
+    frames = arrivals.until(11.0)
     assert len(frames) == pytest.approx(109, abs=1)
     assert all(frame.arrives_s <= 11.0 for frame in frames)
-    assert not camera.frames_until(11.0)
+    assert not arrivals.until(11.0)
+    renderer = Renderer(camera, views.single(), settings, np.random.default_rng(6))
     assert ends[0][2] > 1.0
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11))
-    corners, ids, _ = detector.detectMarkers(frames[-1].image)
+    corners, ids, _ = detector.detectMarkers(renderer.render(frames[-1].motion, frames[-1].since_s))
     assert np.ravel(ids).tolist() == [5]
     sides = np.linalg.norm(np.diff(corners[0][0], axis=0), axis=1)
     assert sides.mean() == pytest.approx(0.2 * 552.0 / ends[0][2], rel=0.1)

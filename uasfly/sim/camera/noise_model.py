@@ -20,8 +20,7 @@ from uasfly.sim.camera.optics import hidden_part
 from uasfly.sim.camera.placement import PlacedBundle
 from uasfly.sim.camera.printed import marker_cells
 from uasfly.sim.camera.settings import CameraSettings
-from uasfly.sim.camera.shutter import Exposure, Shutter
-from uasfly.sim.camera.simulated_camera import Arrivals
+from uasfly.sim.camera.shutter import Exposure
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,26 +51,14 @@ class DetectorFigures:
         return 1.0 / (1.0 + math.exp(-min(max(excess, -50.0), 50.0)))
 
 
-@dataclass(frozen=True, slots=True)
-class ArrivedSample:
-    """A pose and when it is there; `sample` is None where no marker of the frame was found."""
-
-    arrives_s: float
-    exposed_s: float
-    sample: MarkerSample | None
-
-
 class NoiseModelCamera:
-    """Stands for camera, detector and pose solver; see `SimulatedCamera` for how it watches the vehicle.
+    """Stands for picture, detector and pose solver.
 
     Args:
         camera: its file. bundle: what it looks at.
         settings: the scenario's section `camera`.
         rng: of everything random.
         figures: the detector's.
-
-    Attributes:
-        shutter: opens as the vehicle flies.
     """
 
     def __init__(
@@ -82,16 +69,11 @@ class NoiseModelCamera:
         rng: np.random.Generator,
         figures: DetectorFigures = DetectorFigures(),
     ) -> None:
-        shutter_rng, self._rng = rng.spawn(2)
-        self.shutter = Shutter(camera, settings, shutter_rng)
-        self._arrivals = Arrivals(self.shutter)
+        self._rng = rng
         self._camera, self._bundle, self._settings, self._figures = camera, bundle, settings, figures
+        self._exposure_s = settings.open_s(camera)
         self._placed = PlacedBundle(settings.bundle)
         self._cells = {marker.id: len(marker_cells(bundle.family, marker.id)) for marker in bundle.markers}
-
-    def samples_until(self, now_s: float) -> list[ArrivedSample]:
-        """What has been seen in the frames that have arrived by now and were not handed out yet, oldest first."""
-        return [ArrivedSample(it.arrives_s, it.exposed_s, self.see(it)) for it in self._arrivals.until(now_s)]
 
     def see(self, exposure: Exposure) -> MarkerSample | None:
         """The bundle's pose in one exposure with errors drawn; None where no marker is found."""
@@ -136,7 +118,7 @@ class NoiseModelCamera:
     def _seen(self, exposure: Exposure, rotation: Array, place: Array) -> Sequence[tuple[int, float]]:
         """Markers that are found, and the error of their corners [px]."""
         figures, camera = self._figures, self._camera
-        half_s = 0.5 * self.shutter.exposure_s
+        half_s = 0.5 * self._exposure_s
         seen: list[tuple[int, float]] = []
         for marker in self._bundle.markers:
             points = marker.corners @ rotation.T + place

@@ -45,11 +45,10 @@ class Renderer:
         rng: np.random.Generator,
         others: Sequence[tuple[Bundle, BundlePlacement]] = (),
     ) -> None:
-        exposure_s = camera.exposure_s if settings.exposure_s is None else settings.exposure_s
         self._rays = RayTable(camera)
-        self._painter = MarkerPainter(self._rays, exposure_s, camera.rolling_shutter_s)
+        self._exposure_s = settings.open_s(camera)
+        self._painter = MarkerPainter(self._rays, self._exposure_s, camera.rolling_shutter_s)
         self._background = BackgroundTexture(settings.background, rng)
-        self._exposure_s = exposure_s
         self._lens = Lens(camera, settings, self._rays.valid)
         self._sensor = Sensor(settings.noise, (camera.height_px, camera.width_px), rng)
         self.placed = PlacedBundle(settings.bundle)

@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from uasfly.airframe import FileModel, Positive
+from uasfly.camera import Camera
 from uasfly.sim.wind.settings import Finite, Fraction, Vector
 
 Since = Literal["offboard", "boot"]
@@ -142,6 +143,10 @@ class CameraSettings(FileModel):
         Vector, Field(description="rotation of the true mounting against the camera file's, about the camera's axes")
     ] = (0.0, 0.0, 0.0)
     mounting_error_m: Annotated[Vector, Field(description="its offset, body axes")] = (0.0, 0.0, 0.0)
+
+    def open_s(self, camera: Camera) -> float:
+        """How long the shutter is open [s]."""
+        return camera.exposure_s if self.exposure_s is None else self.exposure_s
 
     @model_validator(mode="after")
     def _others_have_names(self) -> CameraSettings:

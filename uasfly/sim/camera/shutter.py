@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -51,7 +52,7 @@ class Shutter:
     def __init__(self, camera: Camera, settings: CameraSettings, rng: np.random.Generator) -> None:
         clock_rng, mount_rng = rng.spawn(2)
         latency_s = camera.latency_s if settings.latency_s is None else settings.latency_s
-        self.exposure_s = camera.exposure_s if settings.exposure_s is None else settings.exposure_s
+        self.exposure_s = settings.open_s(camera)
         self._clock = FrameClock(settings, latency_s, clock_rng)
         self._mount = Mount(settings.mount, mount_rng)
         self._schedule_s = 0.0 if settings.after == "boot" else math.inf  # when the schedule's clock starts
@@ -102,6 +103,22 @@ class Shutter:
         self._taken.append(
             Exposure(shot.sequence, shot.exposed_s, shot.arrives_s, since_s, motion, position, body_to_world)
         )
+
+
+class Arrivals:
+    """Exposures on their way, handed out when their frames arrive."""
+
+    def __init__(self, shutter: Shutter) -> None:
+        self._shutter = shutter
+        self._under_way: deque[Exposure] = deque()
+
+    def until(self, now_s: float) -> list[Exposure]:
+        """Exposures whose frames have arrived by now, oldest first; each once."""
+        self._under_way.extend(self._shutter.take())
+        arrived: list[Exposure] = []
+        while self._under_way and self._under_way[0].arrives_s <= now_s:
+            arrived.append(self._under_way.popleft())
+        return arrived
 
 
 def _between(
