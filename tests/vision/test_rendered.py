@@ -14,6 +14,7 @@ from tests.vision.test_camera import camera
 from tests.vision.test_pose import bundle, some_pose
 from uasfly.camera import Camera
 from uasfly.errors import FileError, UasflyError
+from uasfly.marker_prediction import MarkerPrediction
 from uasfly.messages import Array
 from uasfly.vision.bundle_pose import solve_bundle
 from uasfly.vision.detectors import Detector, make_detector
@@ -24,7 +25,7 @@ from uasfly.vision.pose import Pose
 from uasfly.vision.region import predicted_region
 from uasfly.vision.seek import detect_markers
 from uasfly.vision.square import quaternion_of
-from uasfly.vision.tracker import BundleTracker, MarkerPrediction
+from uasfly.vision.tracker import BundleTracker
 
 BENT = camera([-0.25, 0.08, 0.0005, -0.0004, 0.0])
 

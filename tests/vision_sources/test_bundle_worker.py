@@ -10,11 +10,11 @@ import pytest
 
 from tests.sim_camera import views
 from uasfly.frames import rotation_matrix
+from uasfly.marker_prediction import MarkerPrediction
 from uasfly.messages import MarkerSample
 from uasfly.sim.camera.process import CameraProcess
 from uasfly.sim.camera.settings import Background, Noise
 from uasfly.vision.bundle_worker import watch_bundles
-from uasfly.vision.tracker import MarkerPrediction
 
 PATIENCE_S = 60.0
 

@@ -3,32 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from uasfly.frames import quaternion_inverse, quaternion_product, rotation_matrix, skew
+from uasfly.marker_prediction import MarkerPrediction
 from uasfly.messages import Array
 from uasfly.observer import states as s
 from uasfly.observer.moment import Moment
 
 
-@dataclass(frozen=True, slots=True)
-class ExpectedMarker:
-    """A marker's expected pose relative to the body at a time (eq. 7 of Kalaitzakis & Vitzilaios 2023).
-
-    Attributes:
-        position_in_body: (3,) m. quaternion_marker_to_body: (4,).
-        sigma_m: standard deviation of the position, the largest axis.
-    """
-
-    position_in_body: Array
-    quaternion_marker_to_body: Array
-    sigma_m: float
-
-
-def expected_marker(moment: Moment, core: Array, marker_id: int) -> ExpectedMarker | None:
-    """A marker as it is to be seen; None where the filter does not know it.
+def expected_marker(moment: Moment, core: Array, marker_id: int) -> MarkerPrediction | None:
+    """A marker as it is to be seen (eq. 7 of Kalaitzakis & Vitzilaios 2023); None where the filter does not know it.
 
     Args:
         moment: of the filter; its covariance counts.
@@ -48,4 +34,4 @@ def expected_marker(moment: Moment, core: Array, marker_id: int) -> ExpectedMark
     P = moment.packed[layout.covariance].reshape(layout.errors, layout.errors)
     variances = np.einsum("ij,jk,ik->i", H, P, H)
     turned = quaternion_product(quaternion_inverse(core[s.QUATERNION]), pose[3:])
-    return ExpectedMarker(position, turned, math.sqrt(max(0.0, float(variances.max()))))
+    return MarkerPrediction(position, turned, math.sqrt(max(0.0, float(variances.max()))))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from uasfly.airframe import Airframe
+from uasfly.marker_prediction import MarkerPrediction
 from uasfly.messages import (
     Array,
     AttitudeTargetSample,
@@ -26,7 +27,7 @@ from uasfly.observer import states as s
 from uasfly.observer.agreement import Agreement
 from uasfly.observer.diagnosis import Diagnosis, Journal
 from uasfly.observer.door import Odometry, Sighting, checked_odometry, checked_sighting
-from uasfly.observer.expected import ExpectedMarker, expected_marker
+from uasfly.observer.expected import expected_marker
 from uasfly.observer.glide import Glide
 from uasfly.observer.gnss import DriftWatch, Outage
 from uasfly.observer.moment import Moment, Verdict
@@ -191,7 +192,7 @@ class Observer:
         drift_m_s, agrees = self._drift.speed_m_s, self._agreement.agrees
         return self._journal.diagnose(time_s, moment, window_s, drift_m_s, agrees, self.counters.restarts)
 
-    def expected(self, time_s: float, marker_id: int) -> ExpectedMarker | None:
+    def expected(self, time_s: float, marker_id: int) -> MarkerPrediction | None:
         """Where a marker is to be seen at `time_s`; None where the filter does not know it, or stands far from then."""
         timeline = self._timeline
         if timeline is None or not abs(time_s - timeline.newest.time_s) < EXPECTED_WITHIN_S:

@@ -54,10 +54,6 @@ class _Entry:
     marker: BundleMarker
     hypotheses: tuple[Pose, ...]
 
-    @property
-    def own_place(self) -> Pose:
-        return Pose(self.marker.position, self.marker.unit_quaternion)
-
 
 def solve_bundle(
     bundle: Bundle, camera: Camera, detections: list[Detection], prediction: Pose | None = None

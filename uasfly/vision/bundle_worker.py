@@ -8,9 +8,10 @@ from collections.abc import Callable, Mapping
 from uasfly.bundle import Bundle
 from uasfly.camera import Camera
 from uasfly.errors import UasflyError
+from uasfly.marker_prediction import MarkerPrediction
 from uasfly.vision.frames import Frame
 from uasfly.vision.sources import open_source
-from uasfly.vision.tracker import BundleTracker, Look, MarkerPrediction
+from uasfly.vision.tracker import BundleTracker, Look
 from uasfly.vision.worker import DetectionWorker
 from uasfly.vision.worker_process import Job
 

@@ -6,27 +6,13 @@ from dataclasses import dataclass
 
 from uasfly.bundle import Bundle
 from uasfly.camera import Camera
-from uasfly.messages import Array, MarkerSample
+from uasfly.marker_prediction import MarkerPrediction
+from uasfly.messages import MarkerSample
 from uasfly.vision.bundle_pose import BundleSight, solve_bundle
 from uasfly.vision.detectors import Detection, Detector, Image, Region, make_detector
 from uasfly.vision.mounting import marker_sample, pose_in_camera
 from uasfly.vision.region import RegionPlan
 from uasfly.vision.seek import detect_markers
-
-
-@dataclass(frozen=True, slots=True)
-class MarkerPrediction:
-    """Where the filter expects a bundle.
-
-    Attributes:
-        position_in_body: (3,) m.
-        quaternion_marker_to_body: (4,).
-        sigma_m: standard deviation of the position, the largest axis.
-    """
-
-    position_in_body: Array
-    quaternion_marker_to_body: Array
-    sigma_m: float = 0.1
 
 
 @dataclass(frozen=True, slots=True)
