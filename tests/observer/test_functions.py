@@ -173,3 +173,38 @@ def test_numbers_of_absurd_size_do_no_harm() -> None:
     result, outputs = evaluate_step(packed, inputs, 0)
     assert np.all(np.isfinite(result))
     assert outputs[s.OUT_ACCEPTED].tolist() == [1.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("markers", [0, 1])
+def test_compiled_steps_are_those_of_the_virtual_machine(markers: int) -> None:
+    """To rounding; without a compiler they are the same functions."""
+    rng = np.random.default_rng(31)
+    packed = packed_state(markers, rng)
+    inputs = odometry_inputs(packed[: s.CORE_NOMINAL], rng)
+    expected = evaluate_step(packed, inputs, markers)
+    predict, update = functions.compiled_steps(markers)
+    result, outputs, predicted = np.empty(packed.size), np.empty(s.ODOMETRY_OUTPUTS), np.empty(packed.size)
+    functions.Caller(update)((packed, inputs), (result, outputs))
+    functions.Caller(predict)((packed, inputs), (predicted,))
+    np.testing.assert_allclose(result, expected[0], rtol=1e-9, atol=1e-13)
+    np.testing.assert_allclose(outputs, expected[1], rtol=1e-9, atol=1e-13)
+    other = np.empty(packed.size)
+    functions.Caller(functions.prediction(markers))((packed, inputs), (other,))
+    np.testing.assert_allclose(predicted, other, rtol=1e-9, atol=1e-13)
+
+
+def test_a_caller_looks_at_the_arrays_of_each_call() -> None:
+    """New arrays, changed arrays and arrays of before, in turn."""
+    call, rng = functions.Caller(functions.extrapolation()), np.random.default_rng(32)
+    cores = [random_core(rng) for _ in range(2)]
+    inputs = flying_inputs(rng, 0.01)
+    results = []
+    for core in (cores[0], cores[1], cores[0]):
+        result = np.empty(s.CORE_NOMINAL)
+        call((core, inputs), (result,))
+        results.append(result)
+    np.testing.assert_array_equal(results[0], results[2])
+    assert np.abs(results[0] - results[1]).max() > 0.0
+    cores[0][0] += 1.0
+    call((cores[0], inputs), (results[1],))
+    assert results[1][0] == pytest.approx(results[0][0] + 1.0)

@@ -40,3 +40,11 @@ def test_afterwards_the_reference_is_untouched() -> None:
     """The very same object comes back."""
     reference = _still(np.array([7.0, 8.0]))
     assert GLIDE.onto(reference) is reference
+
+
+def test_what_is_left_at_one_time_is_what_the_reference_gets() -> None:
+    """Before, during and after."""
+    times = np.array([4.0, 5.0, 5.3, 6.1, 6.999, 7.0, 9.0])
+    for time in times:
+        expected = GLIDE.onto(_still(np.array([time]))).position_in_world[0]
+        np.testing.assert_allclose(GLIDE.offset_at(time), expected, atol=1e-15)

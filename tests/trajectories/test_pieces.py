@@ -84,3 +84,13 @@ def test_rest_stands_still_and_a_placement_moves_everything():
     assert not velocity.any()
     assert not acceleration.any()
     assert table.duration_s == 1.0
+
+
+def test_one_position_without_arrays_is_that_of_the_table():
+    """At piece borders, inside, before the start and after the end; straight, once and twice harmonic pieces, moved."""
+    pieces = random_pieces(8)
+    table = PieceTable(pieces, Placement(np.array((1.0, -2.0, 3.0)), 0.7))
+    borders = np.cumsum(pieces.durations_s)
+    for time in (-1.0, 0.0, *borders, *(borders - 0.123), borders[-1] + 1.0):
+        expected = table.sample(np.array([time]))[0][0]
+        np.testing.assert_allclose(table.position_at(time), expected, rtol=1e-12, atol=1e-12)

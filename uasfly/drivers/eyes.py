@@ -15,8 +15,7 @@ import numpy as np
 from uasfly.drivers.sight import Sight
 from uasfly.messages import MarkerSample
 from uasfly.observer.observer import Observer
-from uasfly.sim.camera.shutter import Exposure, Shutter
-from uasfly.sim.camera.simulated_camera import Arrivals
+from uasfly.sim.camera.shutter import Arrivals, Exposure, Shutter
 from uasfly.sim.vehicle import SimulatedVehicle
 
 Seeing = Callable[[Exposure], list[MarkerSample]]
@@ -91,7 +90,7 @@ def _rendered(sight: Sight, observer: Observer, seed: int) -> Seeing:
     import cv2
 
     from uasfly.sim.camera.renderer import Renderer
-    from uasfly.vision.tracker import BundleTracker, MarkerPrediction
+    from uasfly.vision.tracker import BundleTracker
 
     assert sight.scene is not None
     cv2.setNumThreads(1)  # as in the detector's own process
@@ -104,13 +103,7 @@ def _rendered(sight: Sight, observer: Observer, seed: int) -> Seeing:
         image = renderer.render(exposure.motion, exposure.since_s)
         samples = []
         for number, tracker in trackers:
-            expected = observer.expected(exposure.exposed_s, number)
-            prediction = None
-            if expected is not None:
-                prediction = MarkerPrediction(
-                    expected.position_in_body, expected.quaternion_marker_to_body, expected.sigma_m
-                )
-            look = tracker.look(image, exposure.exposed_s, prediction)
+            look = tracker.look(image, exposure.exposed_s, observer.expected(exposure.exposed_s, number))
             if look.sample is not None:
                 samples.append(look.sample)
         return samples

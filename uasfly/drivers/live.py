@@ -15,7 +15,7 @@ from typing import Any
 from uasfly.drivers.live_eyes import LiveEyes
 from uasfly.drivers.metronome import Metronome
 from uasfly.drivers.plan import FlightPlan
-from uasfly.drivers.sight import Sight, marker_datum
+from uasfly.drivers.sight import TrueMarkers
 from uasfly.drivers.watching import BackgroundWatch, Cycle, Watch
 from uasfly.errors import describe_error
 from uasfly.flight.pilot import Pilot, StepResult
@@ -68,7 +68,7 @@ async def fly(
     """
     writer = BackgroundLogWriter(log, plan.description()) if log is not None else None
     watching = BackgroundWatch(watch) if watch is not None else None
-    flight = _LiveFlight(pilot, link, writer, watching, eyes, plan.sight)
+    flight = _LiveFlight(pilot, link, writer, watching, eyes, TrueMarkers(plan.sight))
     facts = None if gather is None else asyncio.create_task(gather())
     started = time.monotonic()
     gc.collect()
@@ -95,7 +95,7 @@ class _LiveFlight:
         writer: BackgroundLogWriter | None,
         watch: BackgroundWatch | None,
         eyes: LiveEyes | None,
-        sight: Sight | None,
+        true_markers: TrueMarkers,
     ) -> None:
         self.summary = SummaryCollector()
         self._pilot = pilot
@@ -103,7 +103,7 @@ class _LiveFlight:
         self._writer = writer
         self._watch = watch
         self._eyes = eyes
-        self._sight = sight
+        self._true_markers = true_markers
         self._log_lost = False
         self._facts: asyncio.Task[FactsSample] | None = None
 
@@ -149,8 +149,7 @@ class _LiveFlight:
             self._pilot.announce(3, self._writer.problem)
         solve_ms = None if result.control is None else result.control.solve_ms
         self.summary.timed(solve_ms, cycle_ms)
-        datum = None if self._sight is None else marker_datum(self._sight, self._pilot.observer.moment)
-        self.summary.cycle(result.status, samples, datum)
+        self.summary.cycle(result.status, samples, self._true_markers.datum(self._pilot.observer))
         self.summary.preflight(result.preflight)
         self._tell_ground(result.status)
         self._record(result, samples)

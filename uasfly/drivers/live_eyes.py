@@ -14,7 +14,7 @@ from uasfly.messages import MarkerSample
 from uasfly.observer.observer import Observer
 from uasfly.vision.bundle_worker import Predictions, watch_bundles
 from uasfly.vision.frames import Announcement
-from uasfly.vision.tracker import Look, MarkerPrediction
+from uasfly.vision.tracker import Look
 from uasfly.vision.worker import DetectionWorker
 
 EXPECT_EVERY_S = 0.03  # about as often as frames come
@@ -47,14 +47,8 @@ class LiveEyes:
         if now_s - self._expected_s < EXPECT_EVERY_S:
             return
         self._expected_s = now_s
-        predictions: dict[int, MarkerPrediction] = {}
-        for number in self._numbers:
-            marker = observer.expected(now_s, number)
-            if marker is not None:
-                predictions[number] = MarkerPrediction(
-                    marker.position_in_body, marker.quaternion_marker_to_body, marker.sigma_m
-                )
-        self._worker.predict(predictions)
+        expected = ((number, observer.expected(now_s, number)) for number in self._numbers)
+        self._worker.predict({number: marker for number, marker in expected if marker is not None})
 
     def close(self) -> None:
         """End the detection, within a second whatever hangs."""

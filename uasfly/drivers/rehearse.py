@@ -11,7 +11,7 @@ import numpy as np
 
 from uasfly.drivers.eyes import make_eyes
 from uasfly.drivers.plan import FlightPlan, build_pilot
-from uasfly.drivers.sight import marker_datum
+from uasfly.drivers.sight import TrueMarkers
 from uasfly.drivers.watching import Cycle, Watch
 from uasfly.flight.choices import Engage
 from uasfly.flight.summary import SummaryCollector
@@ -48,6 +48,7 @@ def rehearse(plan: FlightPlan, log: Path | None = None, watch: Watch | None = No
         rng=np.random.default_rng([plan.seed, 7]),
     )
     pilot = build_pilot(plan, Engage.AUTO, time.perf_counter, late_counts=False)
+    true_markers = TrueMarkers(plan.sight)
     eyes = make_eyes(plan.sight, vehicle, pilot.observer, plan.seed)
     summary = SummaryCollector()
     writer = LogWriter(log, plan.description()) if log is not None else None
@@ -73,7 +74,7 @@ def rehearse(plan: FlightPlan, log: Path | None = None, watch: Watch | None = No
             solve_ms = None if result.control is None else result.control.solve_ms
             cycle_ms = (time.perf_counter() - begun) * 1e3
             summary.timed(solve_ms, cycle_ms)
-            summary.cycle(result.status, (*samples, truth), marker_datum(plan.sight, pilot.observer.moment))
+            summary.cycle(result.status, (*samples, truth), true_markers.datum(pilot.observer))
             if writer is not None:
                 for message in (*samples, truth, *result.requests, result.setpoint, result.status):
                     if message is not None:

@@ -17,7 +17,7 @@ from uasfly.files import find_file, load_file
 from uasfly.flight.summary import MarkerDatum
 from uasfly.frames import rotation_matrix
 from uasfly.observer import states as s
-from uasfly.observer.moment import Moment
+from uasfly.observer.observer import Observer
 from uasfly.sim.camera.placement import PlacedBundle
 from uasfly.sim.camera.settings import BundlePlacement, CameraSettings
 from uasfly.sim.scenario import Scenario
@@ -162,15 +162,24 @@ def _load_bundle(name: str) -> Bundle:
     return find_bundle(name)
 
 
-def marker_datum(sight: Sight | None, moment: Moment | None) -> MarkerDatum | None:
-    """The first bundle that is in the filter, there and in truth (before any move); None where there is none."""
-    if sight is None or sight.scene is None or moment is None:
+class TrueMarkers:
+    """Where the bundles of a simulation are in truth, before any move; without a camera there are none."""
+
+    def __init__(self, sight: Sight | None) -> None:
+        scene = None if sight is None else sight.scene
+        there = () if scene is None else ((scene.bundle, scene.settings.bundle), *scene.others)
+        self._places = [(bundle.marker_id, PlacedBundle(placement)) for bundle, placement in there]
+
+    def datum(self, observer: Observer) -> MarkerDatum | None:
+        """The first bundle that is in the filter, there and in truth; None where there is none."""
+        if not self._places:
+            return None
+        moment = observer.moment
+        if moment is None or not moment.markers:
+            return None
+        for marker_id, true in self._places:
+            if marker_id in moment.markers:
+                pose = moment.packed[s.marker_nominal(moment.markers.index(marker_id))]
+                turn = rotation_matrix(pose[3:]) @ true.first_rotation.T
+                return MarkerDatum(pose[:3].copy(), true.first_position, math.atan2(turn[1, 0], turn[0, 0]))
         return None
-    scene = sight.scene
-    for bundle, placement in ((scene.bundle, scene.settings.bundle), *scene.others):
-        if bundle.marker_id in moment.markers:
-            pose = moment.packed[s.marker_nominal(moment.markers.index(bundle.marker_id))]
-            true = PlacedBundle(placement)
-            turn = rotation_matrix(pose[3:]) @ true.first_rotation.T
-            return MarkerDatum(pose[:3].copy(), true.first_position, math.atan2(turn[1, 0], turn[0, 0]))
-    return None
