@@ -28,7 +28,9 @@ from uasfly.messages import FlightMode
 from uasfly.record.reader import LogReader
 from uasfly.sim.mavlink.process import start_process
 
-PROGRAM = "from uasfly.cli.main import main; main()"
+# Signals as a shell in the foreground hands them on: after `nohup` they would be ignored, and no fault.
+SIGNALS_AS_USUAL = "import signal as s; s.signal(s.SIGHUP, s.SIG_DFL); s.signal(s.SIGINT, s.default_int_handler)"
+PROGRAM = f"{SIGNALS_AS_USUAL}; from uasfly.cli.main import main; main()"
 PATIENCE_S = 180.0
 AFTERWARDS_S = 4.0  # a killed program's vehicle is watched for so long
 TWICE_S = 0.5
