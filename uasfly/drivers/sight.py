@@ -14,7 +14,7 @@ from uasfly.bundle import Bundle
 from uasfly.camera import Camera
 from uasfly.errors import UasflyError
 from uasfly.files import find_file, load_file
-from uasfly.flight.summary import MarkerDatum
+from uasfly.flight.tracking_errors import MarkerDatum
 from uasfly.frames import rotation_matrix
 from uasfly.observer import states as s
 from uasfly.observer.observer import Observer

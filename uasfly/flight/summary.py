@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from array import array
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -14,74 +13,14 @@ from typing import Any
 import numpy as np
 
 from uasfly.errors import FileError
+from uasfly.flight.tracking_errors import MarkerDatum, TrackingErrors
 from uasfly.messages import Array, MarkerSample, OdometrySample, Phase, Sample, Status, TruthSample
 from uasfly.preflight_messages import PreflightCheck
-
-KEPT_CYCLES = 256  # truth and GNSS samples are compared with cycles up to this long ago
 
 
 def _figures() -> array[float]:
     """Figures of every cycle: eight bytes each, so that an hour of flight is some megabytes."""
     return array("d")
-
-
-@dataclass(slots=True)
-class _SquareSum:
-    """Running RMS per axis and largest norm."""
-
-    count: int = 0
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    largest_square: float = 0.0
-
-    def add(self, error: Array) -> None:
-        x, y, z = (error * error).tolist()
-        self.count += 1
-        self.x += x
-        self.y += y
-        self.z += z
-        square = x + y + z
-        self.largest_square = max(self.largest_square, square)
-
-    @property
-    def largest(self) -> float:
-        return math.sqrt(self.largest_square)
-
-    def rms(self) -> dict[str, float] | None:
-        if self.count == 0:
-            return None
-        squares = {"x": self.x, "y": self.y, "z": self.z, "total": self.x + self.y + self.z}
-        return {name: math.sqrt(square / self.count) for name, square in squares.items()}
-
-
-@dataclass(frozen=True, slots=True)
-class MarkerDatum:
-    """Where a marker is as the filter has it and in truth: what a flight by that marker is measured against.
-
-    Attributes:
-        estimated_position, true_position: (3,) m, world.
-        turn_rad: about the vertical, from the true to the estimated.
-    """
-
-    estimated_position: Array
-    true_position: Array
-    turn_rad: float
-
-    def placed(self, position: Array) -> Array:
-        """A true position (3,) [m, world] as it lies in the filter's world: the same as seen from the marker."""
-        x, y, z = (position - self.true_position).tolist()
-        c, s = math.cos(self.turn_rad), math.sin(self.turn_rad)
-        placed: Array = self.estimated_position + np.array((c * x - s * y, s * x + c * y, z))
-        return placed
-
-
-@dataclass(slots=True)
-class _Cycle:
-    time_s: float
-    estimate: Array
-    reference: Array
-    datum: MarkerDatum | None
 
 
 @dataclass(slots=True)
@@ -94,16 +33,7 @@ class SummaryCollector:
 
     duration_s: float = 0.0
     _first_s: float | None = None
-    _cycles: deque[_Cycle] = field(default_factory=lambda: deque(maxlen=KEPT_CYCLES))
-    _truths: deque[TruthSample] = field(default_factory=lambda: deque(maxlen=KEPT_CYCLES))
-    _pending_truth: deque[TruthSample] = field(default_factory=lambda: deque(maxlen=KEPT_CYCLES))
-    _pending_gnss: deque[OdometrySample] = field(default_factory=lambda: deque(maxlen=KEPT_CYCLES))
-    _tracking_true: _SquareSum = field(default_factory=_SquareSum)
-    _tracking_estimated: _SquareSum = field(default_factory=_SquareSum)
-    _estimate: _SquareSum = field(default_factory=_SquareSum)
-    _gnss: _SquareSum = field(default_factory=_SquareSum)
-    _tracking_by_marker: _SquareSum = field(default_factory=_SquareSum)
-    _estimate_by_marker: _SquareSum = field(default_factory=_SquareSum)
+    _errors: TrackingErrors = field(default_factory=TrackingErrors)
     _force_sum: Array = field(default_factory=lambda: np.zeros(3))
     _force_count: int = 0
     _solve_ms: array[float] = field(default_factory=_figures)
@@ -134,20 +64,15 @@ class SummaryCollector:
             estimate = status.estimate
             assert estimate is not None
             reference = status.reference_position_in_world
-            self._cycles.append(_Cycle(status.time_s, estimate.position_in_world, reference, datum))
-            self._tracking_estimated.add(estimate.position_in_world - reference)
+            self._errors.cycle(status.time_s, estimate.position_in_world, reference, datum)
             self._force_sum += estimate.force_in_world
             self._force_count += 1
         for sample in samples:
-            if isinstance(sample, TruthSample):
-                self._pending_truth.append(sample)
-                self._truths.append(sample)
-            elif isinstance(sample, OdometrySample):
-                self._pending_gnss.append(sample)
+            if isinstance(sample, TruthSample | OdometrySample):
+                self._errors.hear(sample)
             elif isinstance(sample, MarkerSample):
                 self._sighted_s.append(sample.time_s)
                 self._sighting_latency_ms.append((status.time_s - sample.time_s) * 1e3)
-        self._compare()
 
     def abort(self, status: Status) -> None:
         """The flight was broken off outside of the step; `status` tells why, and nothing is computed from it."""
@@ -177,7 +102,9 @@ class SummaryCollector:
 
     def result(self, *, wall_s: float, rejected: dict[str, int], **identity: object) -> dict[str, Any]:
         """The summary as plain data; `identity` (airframe, mission, scenario, seed, ...) is copied into it."""
-        tracking = self._tracking_true if self._tracking_true.count else self._tracking_estimated
+        errors = self._errors
+        errors.compare()
+        tracking = errors.against_truth if errors.against_truth.count else errors.against_estimate
         times = np.array(self._setpoint_times_s)
         gaps = np.diff(times)
         span = float(times[-1] - times[0]) if len(times) > 1 else 0.0
@@ -189,9 +116,9 @@ class SummaryCollector:
             "duration_s": round(self.duration_s, 3),
             "tracking_rms_m": _rounded(tracking.rms()),
             "tracking_max_m": round(tracking.largest, 5) if tracking.count else None,
-            "tracking_against": "truth" if self._tracking_true.count else "estimate",
-            "estimate_rms_m": _rounded(self._estimate.rms()),
-            "gnss_rms_m": _rounded(self._gnss.rms()),
+            "tracking_against": "truth" if errors.against_truth.count else "estimate",
+            "estimate_rms_m": _rounded(errors.estimate.rms()),
+            "gnss_rms_m": _rounded(errors.gnss.rms()),
             "by_marker": self._by_marker(),
             "solve_ms": _quantiles(self._solve_ms),
             "cycle_ms": _quantiles(self._cycle_ms),
@@ -210,13 +137,13 @@ class SummaryCollector:
 
     def _by_marker(self) -> dict[str, Any] | None:
         """Errors as seen from the marker, whose place in the world is known no better than GNSS was at first sight."""
-        if not self._tracking_by_marker.count:
+        if not self._errors.by_marker.count:
             return None
         return {
-            "tracking_rms_m": _rounded(self._tracking_by_marker.rms()),
-            "tracking_max_m": round(self._tracking_by_marker.largest, 5),
-            "estimate_rms_m": _rounded(self._estimate_by_marker.rms()),
-            "estimate_max_m": round(self._estimate_by_marker.largest, 5),
+            "tracking_rms_m": _rounded(self._errors.by_marker.rms()),
+            "tracking_max_m": round(self._errors.by_marker.largest, 5),
+            "estimate_rms_m": _rounded(self._errors.estimate_by_marker.rms()),
+            "estimate_max_m": round(self._errors.estimate_by_marker.largest, 5),
         }
 
     def _sightings(self) -> dict[str, Any] | None:
@@ -231,41 +158,6 @@ class SummaryCollector:
             "gap_max_s": round(float(np.diff(times).max()), 3) if len(times) > 1 else None,
             "latency_ms": _quantiles(self._sighting_latency_ms),
         }
-
-    def _compare(self) -> None:
-        """Compare truth with the cycles, and GNSS with truth, as soon as both sides of a sample are there."""
-        while self._pending_truth and self._cycles and self._pending_truth[0].time_s <= self._cycles[-1].time_s:
-            truth = self._pending_truth.popleft()
-            around = _around(self._cycles, truth.time_s)
-            if around is None:
-                continue
-            before, after, weight = around
-            estimate = before.estimate + weight * (after.estimate - before.estimate)
-            reference = before.reference + weight * (after.reference - before.reference)
-            self._tracking_true.add(truth.position_in_world - reference)
-            self._estimate.add(estimate - truth.position_in_world)
-            if before.datum is not None:
-                placed = before.datum.placed(truth.position_in_world)
-                self._tracking_by_marker.add(placed - reference)
-                self._estimate_by_marker.add(estimate - placed)
-        while self._pending_gnss and self._truths and self._pending_gnss[0].time_s <= self._truths[-1].time_s:
-            gnss = self._pending_gnss.popleft()
-            if not self._cycles or not self._cycles[0].time_s <= gnss.time_s <= self._cycles[-1].time_s:
-                continue
-            pair = _around(self._truths, gnss.time_s)
-            if pair is not None:
-                first, second, weight = pair
-                true_position = first.position_in_world + weight * (second.position_in_world - first.position_in_world)
-                self._gnss.add(gnss.position_in_world - true_position)
-
-
-def _around(items: deque[Any], time_s: float) -> tuple[Any, Any, float] | None:
-    """The two items on both sides of a time and the weight of the second; None outside."""
-    for k in range(len(items) - 1, 0, -1):
-        if items[k - 1].time_s <= time_s <= items[k].time_s:
-            span = items[k].time_s - items[k - 1].time_s
-            return items[k - 1], items[k], (time_s - items[k - 1].time_s) / span if span > 0.0 else 0.0
-    return None
 
 
 def _rounded(values: dict[str, float] | None) -> dict[str, float] | None:
