@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-COMMANDS = ("hover", "back-and-forth", "spiral", "fly", "preflight", "rehearse", "sim", "check", "schema")
+COMMANDS = ("hover", "back-and-forth", "spiral", "fly", "preflight", "rehearse", "sim", "check", "schema", "reproduce")
 
 
 def _run(*arguments: str, timeout_s: float = 120.0) -> subprocess.CompletedProcess[str]:
@@ -48,6 +48,7 @@ def test_every_command_explains_itself_with_an_example(command: str) -> None:
         (("check", "no_such_file.yaml"), "no such file"),
         (("schema", "aeroplane"), "expected one of mission"),
         (("sim", "--remote", "somewhere"), "expected host:port"),
+        (("reproduce", "newton1687"), "expected one of asignacion2022"),
     ],
 )
 def test_wrong_input_ends_with_one_message_and_exit_code_2(arguments: tuple[str, ...], message: str) -> None:

@@ -7,7 +7,7 @@ import sys
 import typer
 
 from uasfly import __version__
-from uasfly.cli import bench, calibrate, campaign, check, faults, fly, markers, preflight, rehearse, sim
+from uasfly.cli import bench, calibrate, campaign, check, faults, fly, markers, preflight, rehearse, reproduce, sim
 
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
@@ -44,6 +44,7 @@ faults.register(app)
 bench.register(app)
 markers.register(app)
 campaign.register(app)
+reproduce.register(app)
 calibrate.register(app)
 
 

@@ -61,6 +61,19 @@ class BenchProgress(_Bar):
         self._progress.update(self._task, completed=done, description=text)
 
 
+class ReproduceProgress(_Bar):
+    """Shows which of a paper's experiments is being flown."""
+
+    def __init__(self, paper: str) -> None:
+        """Prepare the bar for a paper of this name."""
+        self._paper = escape(paper)
+        super().__init__(self._paper, TextColumn("{task.percentage:3.0f} %"))
+
+    def update(self, text: str, done: float) -> None:
+        """Tell what is being flown now, and the share that has been."""
+        self._progress.update(self._task, completed=done, description=f"{self._paper}: {escape(text)}")
+
+
 class PictureProgress(_Bar):
     """Shows how many pictures have been looked at; how many there are is not known beforehand."""
 
