@@ -84,13 +84,13 @@ def test_a_swept_observer_is_a_low_pass_of_its_cut_off() -> None:
         (found,) = swept(design, np.array((design.cutoff_hz,)))
         assert found.lag_deg == pytest.approx(45.0, abs=0.5)
         assert found.gain == pytest.approx(np.sqrt(0.5), rel=0.01)
-        (slow,) = swept(design, np.array((0.005,)))
-        assert slow.gain == pytest.approx(1.0, abs=1e-3)
+        (slow,) = swept(design, np.array((0.1,)))
+        assert slow.lag_deg == pytest.approx(np.degrees(np.arctan(0.1 / design.cutoff_hz)), abs=0.1)
 
 
 def test_the_other_observers_are_ordered_as_in_the_paper() -> None:
     """The extended state observer is faster and noisier than DP1, the acceleration-based estimator slower."""
-    found = compare_steps(np.random.default_rng(1))
+    found = compare_steps(15.0, np.random.default_rng(1))
     assert found.rise_s["DP1"] == pytest.approx(np.log(9.0) / (2.0 * np.pi), abs=0.01)
     assert found.rise_s[EXTENDED] < found.rise_s["DP1"] < found.rise_s[ACCELERATION]
     assert found.rise_s[ACCELERATION_FAST] == pytest.approx(found.rise_s["DP1"], rel=0.05)
@@ -153,7 +153,7 @@ def test_a_hover_is_a_course_without_a_radius() -> None:
 def test_all_of_it_in_short(tmp_path: Path) -> None:
     """Every row of the paper, deterministic by seed; progress that only grows; pictures that can be drawn."""
     told: list[float] = []
-    short = Durations(spiral_s=1.0, sine_s=12.0, experiment_s=1.0)
+    short = Durations(spiral_s=1.0, sine_s=11.0, noise_s=1.0, experiment_s=1.0)
     found = reproduce(3, lambda _, done: told.append(done), short)
     assert np.diff(told).min() > -1e-9
     assert told[-1] == 1.0
@@ -166,6 +166,5 @@ def test_all_of_it_in_short(tmp_path: Path) -> None:
     }
     assert all((row.better is None) == (row.paper is None) for row in found.rows)
     found.pictures["step"](tmp_path / "step.png")
-    found.pictures["experiment"](tmp_path / "experiment.png")
     found.pictures["dc3"](tmp_path / "dc3.png")
-    assert all((tmp_path / f"{stem}.png").read_bytes()[:4] == b"\x89PNG" for stem in ("step", "experiment", "dc3"))
+    assert all((tmp_path / f"{stem}.png").read_bytes()[:4] == b"\x89PNG" for stem in ("step", "dc3"))

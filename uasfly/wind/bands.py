@@ -34,10 +34,11 @@ class Bands:
 
 
 class BandSplit:
-    """Causal split of a signal that comes sample by sample, by two Butterworth low passes.
+    """Causal split of a signal that comes sample by sample, by two Butterworth filters of second order.
 
-    What the lower one passes is quasi-static, what only the upper one passes is gust, the rest is what is left: nothing
-    gets lost, and each part is as late as the low pass it comes from.
+    What a low pass lets through is quasi-static, what a high pass lets through is the rest, and gust is what is left:
+    nothing gets lost. In the middle of the band (0.026 Hz) gust is in phase with the signal and 7 % too large; a second
+    low pass instead of the high pass would make it 15 degrees late, and what it lacks would show as rest.
 
     Args:
         period_s: time between two samples [s].
@@ -54,7 +55,8 @@ class BandSplit:
                 f"found {period_s}"
             )
         self._period_s = period_s
-        self._filters = [butter(_ORDER, frequency, fs=1.0 / period_s, output="sos") for frequency in band_hz]
+        kinds = ((low, "lowpass"), (high, "highpass"))
+        self._filters = [butter(_ORDER, edge, kind, fs=1.0 / period_s, output="sos") for edge, kind in kinds]
         self._states: list[Array] = []
         self._passed: list[Array] = []
         self._time_s = -math.inf
@@ -74,7 +76,7 @@ class BandSplit:
         if gap_s > _LONGEST_GAP_S:
             self._time_s = time_s
             self._states = [sosfilt_zi(sos)[:, :, None] * value for sos in self._filters]
-            self._passed = [value, value]
+            self._passed = [value, np.zeros_like(value)]
         else:
             count = max(0, round(gap_s / self._period_s))
             if count == 0:
@@ -90,5 +92,5 @@ class BandSplit:
         return self._parts(value)
 
     def _parts(self, value: Array) -> Bands:
-        slow, slower_than_rest = self._passed or (value, value)
-        return Bands(slow, slower_than_rest - slow, value - slower_than_rest)
+        quasi_static, rest = self._passed or (value, value)
+        return Bands(quasi_static, value - quasi_static - rest, rest)

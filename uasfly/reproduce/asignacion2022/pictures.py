@@ -13,7 +13,7 @@ from uasfly.reproduce.asignacion2022.conditions import GUST_HZ
 from uasfly.reproduce.asignacion2022.flight import DESIGNS, Estimates
 from uasfly.reproduce.asignacion2022.sensors import SAMPLE_S
 from uasfly.reproduce.asignacion2022.sines import Response, swept
-from uasfly.reproduce.asignacion2022.steps import STEP_AT_S, STEP_N, Steps
+from uasfly.reproduce.asignacion2022.steps import ACCELERATION_FAST, STEP_AT_S, STEP_N, Steps
 from uasfly.wind.bands import GUST_BAND_HZ, BandSplit
 from uasfly.wind.six_axes import AXES
 
@@ -48,7 +48,7 @@ def bode(measured: Mapping[str, Response]) -> Draw:
 
     def draw(path: Path) -> None:
         figure, (above, below) = _figure(2, 1, (9.0, 7.0))
-        frequencies: Array = np.geomspace(0.005, 50.0, 25)
+        frequencies: Array = np.geomspace(0.02, 50.0, 21)
         for colour, (name, design) in zip(_COLOURS, DESIGNS.items(), strict=False):
             found = swept(design, frequencies)
             label = f"{name}, f_c = {design.cutoff_hz:g} Hz"
@@ -77,7 +77,8 @@ def steps(found: Steps) -> Draw:
         for axes, forces, what in ((above, found.forces, "without"), (below, found.noisy, "with")):
             axes.plot(found.times_s, step, color="black", label="truth")
             for colour, (name, values) in zip(_COLOURS, forces.items(), strict=True):
-                axes.plot(found.times_s, values, color=colour, linewidth=1.2, label=name)
+                style = "--" if name == ACCELERATION_FAST else "-"  # without noise it lies upon DP1
+                axes.plot(found.times_s, values, style, color=colour, linewidth=1.2, label=name)
             axes.set_ylabel(f"force [N], {what} sensor noise")
         above.legend(loc="lower right", framealpha=0.9)
         below.set_xlabel("time [s]")

@@ -28,6 +28,7 @@ from uasfly.wind.six_axes import AXES
 CONDITIONS = (DC1, DC2, DC3)
 SPIRAL_S = 60.0
 SINE_S = 30.0
+NOISE_S = 60.0
 EXPERIMENT_S = 120.0
 _FIRST_PERIOD_S = 1.0 / GUST_HZ
 
@@ -42,6 +43,7 @@ class Durations:
 
     spiral_s: float = SPIRAL_S
     sine_s: float = SINE_S
+    noise_s: float = NOISE_S
     experiment_s: float = EXPERIMENT_S
 
 
@@ -70,7 +72,7 @@ def reproduce(seed: int, progress: Progress, durations: Durations | None = None)
     samples = flown(BODY, SPIRAL, sine, durations.sine_s, DC1, np.random.default_rng((seed, 3)))
     waves = watched(samples, BODY, telling("spiral, sine"))
     done_s += durations.sine_s
-    steps = compare_steps(np.random.default_rng((seed, 4)))
+    steps = compare_steps(durations.noise_s, np.random.default_rng((seed, 4)))
     hover = hover_in_wind(durations.experiment_s, np.random.default_rng((seed, 5)), telling("hover in wind"))
     white_m_s = noise_for(hover, "DP2", _FORCE_RMSE["DP2"])
     inferred = observed(hover, white_m_s)

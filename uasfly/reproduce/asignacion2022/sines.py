@@ -13,9 +13,9 @@ from uasfly.wind.pole_circle import PoleCircle
 from uasfly.wind.six_axes import SixAxisBody
 
 _SAMPLES_A_PERIOD = 50
-_LONGEST_STEP_S = 0.1
+_LONGEST_STEP_S = 0.004  # as in the simulation: a force shows half a step late
 _SETTLING = 8.0  # time constants of the observer
-_PERIODS = 2
+_PERIODS = 1
 
 
 @dataclass(frozen=True, slots=True)

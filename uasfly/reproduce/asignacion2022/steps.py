@@ -27,7 +27,6 @@ GAIN_1_S = math.pi
 STEP_N = 2.0  # the gust's height on x
 STEP_AT_S = 1.0
 STEP_SHOWN_S = 5.0
-NOISE_S = 60.0
 _SETTLED_S = 5.0
 
 EXTENDED = "extended state"
@@ -57,11 +56,10 @@ class Steps:
     noise_n: Mapping[str, float]
 
 
-def compare_steps(rng: np.random.Generator) -> Steps:
-    """Show all observers the same."""
+def compare_steps(noise_s: float, rng: np.random.Generator) -> Steps:
+    """Show all observers the same step, and so many seconds of noise after they have settled."""
     times = np.arange(0.0, STEP_AT_S + STEP_SHOWN_S, SAMPLE_S)
-    quiet = NOISE_S + _SETTLED_S
-    still = np.arange(0.0, quiet, SAMPLE_S)
+    still = np.arange(0.0, noise_s + _SETTLED_S, SAMPLE_S)
     noise = SensorNoise(rng, len(times)), SensorNoise(rng, len(still))
     forces, noisy, rises, noises = {}, {}, {}, {}
     for name, watch in _observers().items():
