@@ -1,0 +1,1 @@
+"""Wind: from force, from accelerometers, by disturbance observers."""
