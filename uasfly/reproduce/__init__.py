@@ -1,0 +1,1 @@
+"""Papers flown again: their experiments on the built-in simulation, figure beside figure."""
