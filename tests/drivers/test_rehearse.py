@@ -112,7 +112,7 @@ def test_wind_is_held_twice_as_well_as_by_the_backup_pids(mission: str, scenario
 
 def test_each_controller_of_waslander_strays_less_than_the_one_before() -> None:
     """In sum-of-sines gusts, a short hover: backup PIDs, double derivative, wind compensation beside it."""
-    settings = ["scenario.wind.gusts=sum_of_sines", "mission.legs[0].duration_s=12"]
+    settings = ["scenario.wind.gusts=sum_of_sines", "mission.legs[0].duration_s=8"]
     strays = []
     for controller in ("pid", "pid_dd", "pid_dd_wind"):
         plan = load_plan("hover", "f550", scenario="gusty", seed=2, controller=controller, settings=settings)

@@ -25,13 +25,13 @@ from uasfly.reproduce.waslander2009.experiments import (
 from uasfly.reproduce.waslander2009.flight import Record, fly
 from uasfly.reproduce.waslander2009.sensors import AS_LARGEST, PaperSensors
 
-SHORT = Extent(hover_s=8.0, straight_m=2.0, turns=0.25)
+SHORT = Extent(hover_s=6.0, straight_m=2.0, turns=0.25)
 SEED = 3
 
 
 @pytest.fixture(scope="module")
 def hovers() -> dict[str, Record]:
-    """The paper's three controllers in eight seconds of hover."""
+    """The paper's three controllers in six seconds of hover."""
     plans = flight_plans(SEED, SHORT)
     return {name: fly(plan) for (what, name, fed), plan in plans.items() if (what, fed) == (HOVER, BY_ACCELEROMETER)}
 
