@@ -27,7 +27,11 @@ from uasfly.files import load_file
             "line 3: missions[1] no/one.yaml: there is no such file",
         ),
         ("missions: [hover]", "missions: [hover, hover]", 'missions: "hover" appears twice; remove one'),
-        ("controllers: [nmpc]", "controllers: [lqr]", "line 5: controllers[0]: expected one of nmpc, pid, found 'lqr'"),
+        (
+            "controllers: [nmpc]",
+            "controllers: [lqr]",
+            "line 5: controllers[0]: expected one of nmpc, pid, pid_dd, pid_dd_wind, found 'lqr'",
+        ),
         ("count: 3", "count: 0", "line 6: seeds.count: expected a whole number, not below 1"),
         ("{ first: 1, count: 3 }", "{ first: 1 }", "line 6: seeds: expected either count (with first) or values"),
         ("{ first: 1, count: 3 }", "[1, one]", "line 6: seeds.values[1]: expected a whole number"),

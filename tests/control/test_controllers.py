@@ -1,4 +1,4 @@
-"""Both controllers, one step at a time: what they send when all is well and when it is not."""
+"""All controllers, one step at a time: what they send when all is well and when it is not."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.control.vehicle import PointMass, circle, f550, fly, hold_at
-from uasfly.control.controller import Controller, NmpcController, PidController, ReferenceAt
+from uasfly.control.controller import Controller, NmpcController, PidController, PidDdController, ReferenceAt
 from uasfly.control.qp import SolveStatus
 from uasfly.messages import Array, ReferenceHorizon, Setpoint, StateEstimate
 
@@ -23,7 +23,10 @@ MakeController = Callable[[], Controller]
 CONTROLLERS: dict[str, MakeController] = {
     "nmpc": lambda: NmpcController(AIRFRAME),
     "pid": lambda: PidController(AIRFRAME),
+    "pid_dd": lambda: PidDdController(AIRFRAME),
+    "pid_dd_wind": lambda: PidDdController(AIRFRAME, wind=True),
 }
+PIDS = [name for name in CONTROLLERS if name != "nmpc"]
 
 
 @pytest.fixture(params=list(CONTROLLERS))
@@ -197,14 +200,16 @@ def test_a_timer_measures_the_solver(controller: Controller) -> None:
     assert measured.step(0.0, _vehicle().estimate(np.zeros(3)), HERE, None).solve_ms == pytest.approx(1.0)
 
 
-def test_taking_over_the_pid_goes_on_with_what_was_flown() -> None:
-    """The first setpoint of the PID is the one handed over, though position and wind would ask for another."""
-    controller = PidController(AIRFRAME)
+@pytest.mark.parametrize("name", PIDS)
+def test_taking_over_the_pid_goes_on_with_what_was_flown(name: str) -> None:
+    """The first setpoint of a PID is the one handed over, though position and wind would ask for another."""
+    controller = CONTROLLERS[name]()
     before = Setpoint(0.0, 0.05, -0.08, 0.3, 0.0, 0.36)
     controller.reset(0.0, before)
     vehicle = _vehicle()
     vehicle.position, vehicle.yaw = np.array((0.05, -0.05, 0.9)), 0.3
-    point = controller.step(0.0, vehicle.estimate(np.zeros(3)), HERE, None).setpoint
+    vehicle.velocity = np.array((0.1, 0.05, 0.0))
+    point = controller.step(0.0, vehicle.estimate(np.array((0.6, -0.4, 0.1))), HERE, None).setpoint
     np.testing.assert_allclose(
         (point.roll_rad, point.pitch_rad, point.yaw_rad, point.thrust), (0.05, -0.08, 0.3, 0.36), atol=2e-4
     )

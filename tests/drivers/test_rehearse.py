@@ -110,6 +110,18 @@ def test_wind_is_held_twice_as_well_as_by_the_backup_pids(mission: str, scenario
     assert pid["tracking_rms_m"]["total"] >= 2.0 * nmpc["tracking_rms_m"]["total"]
 
 
+def test_each_controller_of_waslander_strays_less_than_the_one_before() -> None:
+    """In sum-of-sines gusts, a short hover: backup PIDs, double derivative, wind compensation beside it."""
+    settings = ["scenario.wind.gusts=sum_of_sines", "mission.legs[0].duration_s=8"]
+    strays = []
+    for controller in ("pid", "pid_dd", "pid_dd_wind"):
+        plan = load_plan("hover", "f550", scenario="gusty", seed=2, controller=controller, settings=settings)
+        summary = rehearse(plan)
+        assert (summary["outcome"], summary["controller"]) == ("completed", controller)
+        strays.append(summary["tracking_rms_m"]["total"])
+    assert strays[2] < 0.7 * strays[1] < 0.7 * strays[0]
+
+
 def test_setpoints_do_not_jump_in_gusts_that_cannot_be_held(tmp_path: Path) -> None:
     """Gusts of 9 m/s^2, 5.7 can be held: leaned over to the limit, roll and thrust stay steady instead of chattering.
 

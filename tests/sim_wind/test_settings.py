@@ -22,6 +22,8 @@ def problems(name: str, *assignments: str) -> str:
     ("scenario", "assignment", "words"),
     [
         ("calm", "wind.gusts=dryden", "mean wind at 6.1 m, which is 0"),
+        ("calm", "wind.gusts=sum_of_sines", "gusts: sum_of_sines scales with the mean wind at 6.1 m, which is 0"),
+        ("gusty", "wind.gusts=sines", "sum_of_sines"),
         ("gusty", "wind.mean.kind=storm", "boundary_layer"),
         ("gusty", "wind.mean.speed_at_10_m_m_s=-1", "speed_at_10_m_m_s"),
         ("gusty", "wind.mean.toward_deg=.nan", "toward_deg"),

@@ -149,7 +149,9 @@ class Campaign(FileModel):
     airframes: Names
     missions: Names
     scenarios: Names
-    controllers: Annotated[list[Literal["nmpc", "pid"]], Field(default_factory=lambda: ["nmpc"], min_length=1)]
+    controllers: Annotated[
+        list[Literal["nmpc", "pid", "pid_dd", "pid_dd_wind"]], Field(default_factory=lambda: ["nmpc"], min_length=1)
+    ]
     seeds: Seeds
     overrides: Annotated[Overrides, Field(default_factory=Overrides)]
     success: Success = Success()

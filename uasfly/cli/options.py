@@ -12,7 +12,14 @@ Scenario = Annotated[
     str, typer.Option("--scenario", help="Scenario of the built-in simulation: a shipped name or a YAML file.")
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random in the simulation.")]
-Controller = Annotated[str, typer.Option("--controller", help="Controller: nmpc, or pid (the paper's backup PIDs).")]
+Controller = Annotated[
+    str,
+    typer.Option(
+        "--controller",
+        help="Controller: nmpc; pid (backup PIDs); pid_dd (PIDs with the acceleration's error); "
+        "pid_dd_wind (those, tilted against the estimated wind).",
+    ),
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option(

@@ -1,10 +1,10 @@
-"""The baseline: the paper's backup PIDs as the only controller (`--controller pid`)."""
+"""The baseline: the backup PIDs of Kalaitzakis 2023 as the only controller (`--controller pid`)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from uasfly.airframe import Airframe
+from uasfly.airframe import Airframe, Backup
 from uasfly.control.backup import PositionPid
 from uasfly.control.delay import inputs_of
 from uasfly.control.parts import Attitude, SetpointGuard, all_finite
@@ -12,15 +12,21 @@ from uasfly.control.protocol import ControlResult, ReferenceAt, Timer
 from uasfly.control.qp import SolveStatus
 from uasfly.control.thrust_map import ThrustMap
 from uasfly.control.yaw import YawController
-from uasfly.messages import Setpoint, StateEstimate
+from uasfly.messages import Array, Setpoint, StateEstimate
 
 
 class PidController:
-    """Position PIDs, yaw PID and thrust map; needs no model of the wind and uses none of its estimate."""
+    """Position PIDs, yaw PID and thrust map; needs no model of the wind and uses none of its estimate.
 
-    def __init__(self, airframe: Airframe, timer: Timer | None = None) -> None:
+    Args:
+        airframe: model, limits and gains.
+        timer: clock in seconds that measures the step; without one nothing is measured.
+        gains: of the position PIDs; by default the airframe file's backup.
+    """
+
+    def __init__(self, airframe: Airframe, timer: Timer | None = None, gains: Backup | None = None) -> None:
         self._timer = timer
-        self._pid = PositionPid(airframe.backup, airframe.model, airframe.limits)
+        self._pid = PositionPid(airframe.backup if gains is None else gains, airframe.model, airframe.limits)
         self._yaw = YawController(airframe.yaw_pid, airframe.limits.yaw_rate_rad_s)
         self._thrust_map = ThrustMap(airframe)
         self._guard = SetpointGuard(airframe.limits, airframe.model.hover_thrust)
@@ -63,7 +69,7 @@ class PidController:
         )
         blind = not (np.isfinite(attitude.yaw_rad) and all_finite(position_error, velocity_error))
         heading = yaw if np.isnan(attitude.yaw_rad) else attitude.yaw_rad
-        acceleration = reference.acceleration_in_world[0]
+        acceleration = self._feed_forward(time_s, estimate, reference.acceleration_in_world[0])
         if self._taken_over is not None and not blind:
             velocity = estimate.velocity_in_world
             flown = self._pid.acceleration_of(inputs_of(self._taken_over), velocity, heading)
@@ -85,3 +91,12 @@ class PidController:
             predicted_positions=None,
             text=text,
         )
+
+    def _feed_forward(
+        self,
+        time_s: float,  # noqa: ARG002 - for those that add to it
+        estimate: StateEstimate,  # noqa: ARG002
+        reference_acceleration: Array,
+    ) -> Array:
+        """Acceleration (3,) [m/s^2, world] that is asked for beside the PIDs'."""
+        return reference_acceleration

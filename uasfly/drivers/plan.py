@@ -18,7 +18,7 @@ from uasfly.mission import Mission
 from uasfly.sim.plant import Plant
 from uasfly.sim.scenario import Scenario
 
-CONTROLLERS = ("nmpc", "pid")
+CONTROLLERS = ("nmpc", "pid", "pid_dd", "pid_dd_wind")
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def load_plan(
     Args:
         mission: name of a shipped file or a path.
         airframe: name of a shipped file or a path.
-        controller: nmpc or pid.
+        controller: one of `CONTROLLERS`.
         seed: of everything random in the simulation.
         scenario: name of a shipped file or a path; without one there is no simulation.
         settings: `--set` texts, `airframe.model.drag_1_s=[0.3, 0.3, 0.3]`, `mission.takeoff.height_m=2` or
@@ -142,11 +142,13 @@ def build_pilot(
 
 def build_controller(plan: FlightPlan, timer: Callable[[], float] | None, *, late_counts: bool) -> Controller:
     """The controller of a plan, see `build_pilot`."""
-    from uasfly.control.controller import NmpcController, PidController
+    from uasfly.control.controller import NmpcController, PidController, PidDdController
 
     if plan.controller == "nmpc":
         return NmpcController(plan.airframe, timer=timer, deadline_s=None if late_counts else math.inf)
-    return PidController(plan.airframe, timer=timer)
+    if plan.controller == "pid":
+        return PidController(plan.airframe, timer=timer)
+    return PidDdController(plan.airframe, timer=timer, wind=plan.controller == "pid_dd_wind")
 
 
 def _split_settings(settings: list[str]) -> dict[str, dict[str, object]]:

@@ -24,6 +24,9 @@ Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 TWENTY_FEET_M = 6.096  # height at which MIL-F-8785C measures the wind that scales its low-altitude gusts
 TEN_METRES_M = 10.0
+VON_KARMAN = 0.4
+LAYER_SHARE = 0.02
+EARTH_RATE_RAD_S = 7.2921e-5
 
 
 class ConstantWind(FileModel):
@@ -54,6 +57,11 @@ class BoundaryLayer(FileModel):
             * math.log(TWENTY_FEET_M / self.roughness_m)
             / math.log(TEN_METRES_M / self.roughness_m)
         )
+
+    def top_m(self, latitude_deg: float) -> float:
+        """Height b v*/(2 omega_e sin latitude), b = 0.02, up to which the paper takes the profile to hold [m]."""
+        friction_velocity = VON_KARMAN * self.speed_at_10_m_m_s / math.log(TEN_METRES_M / self.roughness_m)
+        return LAYER_SHARE * friction_velocity / (2.0 * EARTH_RATE_RAD_S * math.sin(math.radians(abs(latitude_deg))))
 
 
 class RadialTable(FileModel):
@@ -170,14 +178,20 @@ class WindSettings(FileModel):
     mean: Annotated[ConstantWind | BoundaryLayer, Field(discriminator="kind")] = ConstantWind(
         velocity_in_world_m_s=(0.0, 0.0, 0.0)
     )
-    gusts: Annotated[Literal["none", "dryden"], Field(description="dryden: MIL-F-8785C, low altitude")] = "none"
+    gusts: Annotated[
+        Literal["none", "dryden", "sum_of_sines"],
+        Field(
+            description="dryden: MIL-F-8785C, low altitude; sum_of_sines: a band of it as Waslander & Wang 2009 fly it"
+        ),
+    ] = "none"
     jets: tuple[JetSettings, ...] = ()
 
     @model_validator(mode="after")
     def _gusts_need_a_mean(self) -> WindSettings:
-        if self.gusts == "dryden" and self.mean.w20_m_s == 0.0:
+        if self.gusts != "none" and self.mean.w20_m_s == 0.0:
             raise ValueError(
-                "gusts: dryden scales with the mean wind at 6.1 m, which is 0; give wind.mean a speed or remove gusts"
+                f"gusts: {self.gusts} scales with the mean wind at 6.1 m, which is 0; "
+                "give wind.mean a speed or remove gusts"
             )
         return self
 
