@@ -163,6 +163,8 @@ def test_all_of_it_in_short(tmp_path: Path) -> None:
     assert {row.quantity: row.paper for row in found.rows if row.paper is not None} == {
         "lag at 0.1 Hz, f_c = 1 Hz": 5.7,
         "force RMSE, DP1": 0.43,
+        "force RMSE, DP1, noise 0.02 m/s": 0.43,
+        "force RMSE, DP2, noise 0.02 m/s": 1.03,
     }
     assert all((row.better is None) == (row.paper is None) for row in found.rows)
     found.pictures["step"](tmp_path / "step.png")

@@ -51,7 +51,7 @@ def test_what_it_leaves_of_the_sigmas_is_what_its_text_says() -> None:
     variance = np.zeros(3)
     for seed in range(20):
         gusts = SumOfSines(7.7, np.random.default_rng(seed), 0.1)
-        variance += np.array([gusts.step(2.0) for _ in range(4000)]).var(axis=0) / 20
+        variance += np.array([gusts.step(2.0, 5.0) for _ in range(4000)]).var(axis=0) / 20
     share = np.sqrt(variance) / (figures.sigma_u_m_s, figures.sigma_u_m_s, figures.sigma_w_m_s)
     assert share == pytest.approx((0.41, 0.41, 0.56), abs=0.02)
 
@@ -73,7 +73,7 @@ def test_the_field_adds_it_to_the_mean_along_the_wind() -> None:
     mean = 8.0 * math.log(2.0 / 0.05) / math.log(200.0)
     along, left = np.array((math.cos(math.pi / 6), 0.5)), np.array((-0.5, math.cos(math.pi / 6)))
     for _ in range(100):
-        u, v, w = gusts.step(2.0)
+        u, v, w = gusts.step(2.0, 5.0)
         expected = (*((mean + u) * along + v * left).tolist(), w)
         assert field.step((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), None).free_in_world == pytest.approx(expected, abs=1e-12)
     assert rng.standard_normal() == other.standard_normal()
@@ -82,7 +82,7 @@ def test_the_field_adds_it_to_the_mean_along_the_wind() -> None:
 def test_climbing_makes_no_jump() -> None:
     """From 2 m to 10 m within 8 s the gust changes by no more than the steepest sines allow."""
     gusts = SumOfSines(8.0, np.random.default_rng(4), 0.004)
-    record = np.array([gusts.step(2.0 + 0.004 * index) for index in range(2000)])
+    record = np.array([gusts.step(2.0 + 0.004 * index, 5.0) for index in range(2000)])
     assert np.abs(np.diff(record, axis=0)).max() < 0.05
 
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from uasfly.wind.momentum import hover_inflow_m_s, static_thrust_m_s2, thrust_ratio, thrust_ratio_in_wind
+from uasfly.wind.momentum import hover_inflow_m_s, thrust_ratio, thrust_ratio_in_wind
 
 AXIAL = (-3.0, -0.8, -0.3, 0.0, 0.2, 1.0, 4.0, 20.0)
 IN_PLANE = (0.0, 1e-6, 0.3, 1.0, 3.0, 30.0)
@@ -73,4 +73,3 @@ def test_voltage_acts_through_the_hover_inflow() -> None:
     low, high = (hover_inflow_m_s(thrust, 0.2714 / 1.8) for thrust in (9.80665, 4 * 9.80665))
     assert (low, high) == pytest.approx((5.15, 10.30), abs=0.01)
     assert thrust_ratio_in_wind(6.0, 0.1, high) == pytest.approx(thrust_ratio_in_wind(3.0, 0.1, low))
-    assert static_thrust_m_s2(0.4, 14.0, 30.0, 16.0, 2.0) == pytest.approx(12.0 * (14.0 / 16.0) ** 2)

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from uasfly.airframe import FileModel, Positive
+from uasfly.drivers.plan import ControllerName
 from uasfly.errors import FileError, shortened
 from uasfly.files import split_key
 
@@ -149,9 +150,7 @@ class Campaign(FileModel):
     airframes: Names
     missions: Names
     scenarios: Names
-    controllers: Annotated[
-        list[Literal["nmpc", "pid", "pid_dd", "pid_dd_wind"]], Field(default_factory=lambda: ["nmpc"], min_length=1)
-    ]
+    controllers: Annotated[list[ControllerName], Field(default_factory=lambda: ["nmpc"], min_length=1)]
     seeds: Seeds
     overrides: Annotated[Overrides, Field(default_factory=Overrides)]
     success: Success = Success()

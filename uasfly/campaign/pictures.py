@@ -9,11 +9,11 @@ from typing import Any
 
 from uasfly.campaign.statistics import completed_rms, grouped, label, wilson, worst
 from uasfly.campaign.table import Row
+from uasfly.plotting import quiet_figure, save
 
 MOST_BOXES = 30
 MOST_LINES = 8
 WORST_FLIGHTS = 15
-DOTS_PER_INCH = 120
 SPREAD = 0.15  # of a box's height: how far the points of single flights lie apart
 _COLOURS = ("#2f6fd0", "#e0762a", "#2f9e5a", "#c23b3b", "#7d55c7", "#8a6d3b", "#d05fa6", "#5b6470")
 _OUTCOMES = {"completed": _COLOURS[0], "aborted": _COLOURS[3], "error": _COLOURS[7]}
@@ -58,7 +58,7 @@ def rms_boxes(rows: Sequence[Row], swept: Sequence[str], path: Path) -> None:
         axes.set_ylim(0.4, len(boxes) + 0.6)
         axes.set_xlim(left=0.0)
     axes.set_xlabel("RMS of position, truth minus reference [cm]")
-    _save(figure, path)
+    save(figure, path)
 
 
 def success_against_wind(rows: Sequence[Row], path: Path) -> None:
@@ -93,7 +93,7 @@ def success_against_wind(rows: Sequence[Row], path: Path) -> None:
         f"mean wind of the scenario (at 10 m; jets: on the axis at their aim) [m/s], {flights} flights a point"
     )
     axes.legend(loc="best", framealpha=0.9)
-    _save(figure, path)
+    save(figure, path)
 
 
 def worst_flights(rows: Sequence[Row], swept: Sequence[str], path: Path) -> None:
@@ -122,26 +122,14 @@ def worst_flights(rows: Sequence[Row], swept: Sequence[str], path: Path) -> None
     handles: list[Any] = [Patch(color=c, label=f"RMS, {name}") for name, c in _OUTCOMES.items() if name in present]
     handles.append(Line2D([], [], marker="|", color="black", linestyle="", markersize=11, label="largest error"))
     axes.legend(handles=handles, loc="lower right", framealpha=0.9)
-    _save(figure, path)
+    save(figure, path)
 
 
 def _figure(height_inches: float) -> tuple[Any, Any]:
-    """A figure without pyplot, which keeps state and may want a display."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 1.4 + max(1.2, height_inches)), layout="constrained")
-    axes = figure.add_subplot()
-    axes.grid(True, color="#dddddd", linewidth=0.8)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    return figure, axes
+    figure, panels = quiet_figure(1, 1, (9.0, 1.4 + max(1.2, height_inches)))
+    return figure, panels[0, 0]
 
 
 def _nothing(axes: Any, text: str) -> None:
     axes.text(0.5, 0.5, text, ha="center", va="center", transform=axes.transAxes)
     axes.set_yticks([])
-
-
-def _save(figure: Any, path: Path) -> None:
-    figure.savefig(path, dpi=DOTS_PER_INCH, metadata={"Software": None})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, get_args
 
 from uasfly.airframe import Airframe
 from uasfly.control.protocol import Controller
@@ -18,7 +18,8 @@ from uasfly.mission import Mission
 from uasfly.sim.plant import Plant
 from uasfly.sim.scenario import Scenario
 
-CONTROLLERS = ("nmpc", "pid", "pid_dd", "pid_dd_wind")
+ControllerName = Literal["nmpc", "pid", "pid_dd", "pid_dd_wind"]
+CONTROLLERS = get_args(ControllerName)
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,9 +85,7 @@ class BandSplit:
             for number, sos in enumerate(self._filters):
                 passed, self._states[number] = sosfilt(sos, way, axis=0, zi=self._states[number])
                 self._passed[number] = passed[-1]
-            self._time_s += (
-                count * self._period_s
-            )  # by whole periods: samples that come unevenly keep the filters' rate
+            self._time_s += count * self._period_s  # whole periods: uneven samples keep the filters' rate
         self._value = value
         return self._parts(value)
 

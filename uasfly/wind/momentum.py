@@ -39,13 +39,6 @@ def hover_inflow_m_s(static_thrust_m_s2: float, disc_area_per_mass_m2_kg: float)
     return math.sqrt(max(static_thrust_m_s2, 0.0) / (2.0 * AIR_DENSITY_KG_M3 * disc_area_per_mass_m2_kg))
 
 
-def static_thrust_m_s2(
-    command: float, voltage_v: float, k_thrust_m_s2: float, reference_voltage_v: float, thrust_exponent: float
-) -> float:
-    """T_h over the mass [m/s^2] of a thrust command 0..1 at a battery voltage, as an airframe file states it."""
-    return k_thrust_m_s2 * command * float((voltage_v / reference_voltage_v) ** thrust_exponent)
-
-
 def thrust_ratio(axial: float, in_plane: float) -> ThrustRatio:
     """T / T_h from the airspeed through the disc (positive: climbing) and along it, both over v_h.
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from uasfly.messages import Array
+from uasfly.plotting import quiet_figure, save
 from uasfly.reproduce.asignacion2022.conditions import GUST_HZ
 from uasfly.reproduce.asignacion2022.flight import DESIGNS, Estimates
 from uasfly.reproduce.asignacion2022.sensors import SAMPLE_S
@@ -17,7 +17,6 @@ from uasfly.reproduce.asignacion2022.steps import ACCELERATION_FAST, STEP_AT_S, 
 from uasfly.wind.bands import GUST_BAND_HZ, BandSplit
 from uasfly.wind.six_axes import AXES
 
-DOTS_PER_INCH = 120
 _TRUTH = "#5b6470"
 _COLOURS = ("#2f6fd0", "#e0762a", "#2f9e5a", "#c23b3b", "#7d55c7")
 _NOISIER_FIRST = (("DP2", _COLOURS[1]), ("DP1", _COLOURS[0]))  # so that the other is drawn over it
@@ -29,7 +28,7 @@ def estimates(name: str, found: Estimates) -> Draw:
     """Six panels, one an axis: disturbance, and both designs' estimates of it."""
 
     def draw(path: Path) -> None:
-        figure, panels = _figure(2, 3, (13.0, 6.5))
+        figure, panels = quiet_figure(2, 3, (13.0, 6.5))
         figure.suptitle(f"{name}: disturbance and its estimates")
         for number, (axes, axis) in enumerate(zip(panels.flat, AXES, strict=True)):
             for design, colour in _NOISIER_FIRST:
@@ -38,7 +37,7 @@ def estimates(name: str, found: Estimates) -> Draw:
             axes.set_ylabel(f"{axis} [{'N' if number < 3 else 'N m'}]")
             axes.set_xlabel("time [s]")
         panels.flat[0].legend(loc="upper right", framealpha=0.9)
-        _save(figure, path)
+        save(figure, path)
 
     return draw
 
@@ -47,7 +46,7 @@ def bode(measured: Mapping[str, Response]) -> Draw:
     """Gain and phase lag of both designs over frequency, measured sine by sine; the flight's lag as a ring."""
 
     def draw(path: Path) -> None:
-        figure, (above, below) = _figure(2, 1, (9.0, 7.0))
+        figure, ((above,), (below,)) = quiet_figure(2, 1, (9.0, 7.0))
         frequencies: Array = np.geomspace(0.02, 50.0, 21)
         for colour, (name, design) in zip(_COLOURS, DESIGNS.items(), strict=False):
             found = swept(design, frequencies)
@@ -63,7 +62,7 @@ def bode(measured: Mapping[str, Response]) -> Draw:
         above.set_ylabel("gain [dB]")
         below.set_ylabel("phase lag [deg]")
         below.set_xlabel("frequency of the disturbance [Hz]")
-        _save(figure, path)
+        save(figure, path)
 
     return draw
 
@@ -72,7 +71,7 @@ def steps(found: Steps) -> Draw:
     """All observers' answers to a step, without and with sensor noise."""
 
     def draw(path: Path) -> None:
-        figure, (above, below) = _figure(2, 1, (9.0, 7.0))
+        figure, ((above,), (below,)) = quiet_figure(2, 1, (9.0, 7.0))
         step: Array = np.where(found.times_s > STEP_AT_S, STEP_N, 0.0)
         for axes, forces, what in ((above, found.forces, "without"), (below, found.noisy, "with")):
             axes.plot(found.times_s, step, color="black", label="truth")
@@ -82,7 +81,7 @@ def steps(found: Steps) -> Draw:
             axes.set_ylabel(f"force [N], {what} sensor noise")
         above.legend(loc="lower right", framealpha=0.9)
         below.set_xlabel("time [s]")
-        _save(figure, path)
+        save(figure, path)
 
     return draw
 
@@ -91,7 +90,7 @@ def experiment(found: Estimates) -> Draw:
     """Force along the wind: truth and estimates; and DP1's estimate by bands."""
 
     def draw(path: Path) -> None:
-        figure, (above, below) = _figure(2, 1, (11.0, 7.0))
+        figure, ((above,), (below,)) = quiet_figure(2, 1, (11.0, 7.0))
         for design, colour in _NOISIER_FIRST:
             above.plot(found.times_s, found.estimates[design][:, 0], color=colour, linewidth=0.9, label=design)
         above.plot(found.times_s, found.truth[:, 0], color="black", linewidth=1.0, label="truth")
@@ -111,24 +110,6 @@ def experiment(found: Estimates) -> Draw:
         below.set_xlabel("time [s]")
         for axes in (above, below):
             axes.legend(loc="upper right", framealpha=0.9)
-        _save(figure, path)
+        save(figure, path)
 
     return draw
-
-
-def _figure(rows: int, columns: int, inches: tuple[float, float]) -> tuple[Any, Any]:
-    """A figure without pyplot, which keeps state and may want a display."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=inches, layout="constrained")
-    panels = figure.subplots(rows, columns)
-    for axes in panels.flat:
-        axes.grid(True, color="#dddddd", linewidth=0.8)
-        axes.set_axisbelow(True)
-        for side in ("top", "right"):
-            axes.spines[side].set_visible(False)
-    return figure, panels
-
-
-def _save(figure: Any, path: Path) -> None:
-    figure.savefig(path, dpi=DOTS_PER_INCH, metadata={"Software": None})

@@ -171,9 +171,10 @@ def _experiment_rows(hover: Hover, white_m_s: float, inferred: Estimates) -> Ite
     yield Row(name, "force RMSE, DP2", "N", None, force_rmse(inferred, "DP2"), None, note)
     usual = observed(hover, USUAL_VELOCITY_M_S)
     for design, figure in _FORCE_RMSE.items():
-        note = f"uasfly's usual noise, not the paper's (there {figure:g} N)"
+        found = force_rmse(usual, design)
+        note = "uasfly's usual noise, not the paper's, which it does not state"
         quantity = f"force RMSE, {design}, noise {USUAL_VELOCITY_M_S:g} m/s"
-        yield Row(name, quantity, "N", None, force_rmse(usual, design), None, note)
+        yield Row(name, quantity, "N", figure, found, found <= figure, note)
     for design in DESIGNS:
         along = float(inferred.rmse(design)[0])
         yield Row(name, f"force RMSE along the wind, {design}", "N", None, along, None)

@@ -15,7 +15,7 @@ from uasfly.frames import euler_from_quaternion, rotation_matrix
 from uasfly.messages import Array
 from uasfly.reproduce.rows import Progress, Reproduction, Row
 from uasfly.reproduce.waslander2009 import pictures, vehicle
-from uasfly.reproduce.waslander2009.flight import FlightPlan, MakeOnboard, Record, fly
+from uasfly.reproduce.waslander2009.flight import MakeOnboard, PaperFlight, Record, fly
 from uasfly.reproduce.waslander2009.onboard import Onboard
 from uasfly.reproduce.waslander2009.sensors import AS_LARGEST, AS_SIGMA, SensorErrors
 from uasfly.sim.plant import Plant
@@ -66,7 +66,7 @@ def reproduce(seed: int, progress: Progress) -> Reproduction:
     return compare(records, extent)
 
 
-def flight_plans(seed: int, extent: Extent) -> dict[Key, FlightPlan]:
+def flight_plans(seed: int, extent: Extent) -> dict[Key, PaperFlight]:
     """Everything that is flown."""
     airframe, plant = vehicle.load_vehicle()
     missions = {
@@ -74,10 +74,10 @@ def flight_plans(seed: int, extent: Extent) -> dict[Key, FlightPlan]:
         STRAIGHT: vehicle.straight(extent.straight_m),
         CIRCLE: vehicle.circle(extent.turns),
     }
-    plans: dict[Key, FlightPlan] = {}
+    plans: dict[Key, PaperFlight] = {}
     for experiment, mission in missions.items():
         own = OWN if experiment == HOVER else ("nmpc",)
-        plan = FlightPlan(airframe, plant, vehicle.paper_scenario(), mission, "", seed, {}, flies_by=None)
+        plan = PaperFlight(airframe, plant, vehicle.paper_scenario(), mission, "", seed, {}, flies_by=None)
         for name in CONTROLLERS:
             looks_on = experiment != STRAIGHT and name == "pid_dd_wind"
             fed = replace(plan, controller=name, onboard=_sensors(airframe, plant, looks_on), flies_by=MAIN)
@@ -224,8 +224,8 @@ def _pictures(records: Records) -> dict[str, Callable[[Path], None]]:
 
     hovers = {**by_accelerometer(HOVER), "uasfly's NMPC": records[HOVER, "nmpc", BY_OBSERVER]}
     return {
-        f"{PAPER}_hover": partial(pictures.positions, hovers),
-        f"{PAPER}_wind": partial(pictures.winds, records[HOVER, "pid_dd_wind", BY_ACCELEROMETER], MAIN),
-        f"{PAPER}_straight": partial(pictures.paths, by_accelerometer(STRAIGHT)),
-        f"{PAPER}_circle": partial(pictures.paths, by_accelerometer(CIRCLE)),
+        "hover": partial(pictures.positions, hovers),
+        "wind": partial(pictures.winds, records[HOVER, "pid_dd_wind", BY_ACCELEROMETER], MAIN),
+        "straight": partial(pictures.paths, by_accelerometer(STRAIGHT)),
+        "circle": partial(pictures.paths, by_accelerometer(CIRCLE)),
     }

@@ -32,7 +32,7 @@ MakeOnboard = Callable[[Array, np.random.Generator], Onboard]  # from the attitu
 
 
 @dataclass(frozen=True, slots=True)
-class FlightPlan:
+class PaperFlight:
     """What flies.
 
     Attributes:
@@ -148,7 +148,7 @@ def make_controller(name: str, airframe: Airframe, onboard: Onboard | None) -> C
     )
 
 
-def fly(plan: FlightPlan) -> Record:
+def fly(plan: PaperFlight) -> Record:
     """Fly a plan's legs. The same plan gives the same record.
 
     Raises:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from uasfly.airframe import GRAVITY_M_S2, Airframe
+from uasfly.control.thrust_map import ThrustMap
 from uasfly.frames import rotation_matrix
 from uasfly.messages import Array, StateEstimate
 from uasfly.reproduce.waslander2009.sensors import IMU_PERIOD_S, PaperSensors, SensorErrors
@@ -19,7 +20,6 @@ from uasfly.wind.accelerometer_filter import (
     AccelerometerWindFilter,
 )
 from uasfly.wind.accelerometer_model import AccelerometerModel, wind_from_specific_force
-from uasfly.wind.momentum import static_thrust_m_s2
 
 AIRBORNE_M = 0.5
 POSITIONS_EVERY = 5  # inertial samples: 10 Hz
@@ -64,6 +64,7 @@ class Onboard:
         treats_bias: bool = True,
     ) -> None:
         self._airframe, self._model, self._errors = airframe, model, errors
+        self._thrust_map = ThrustMap(airframe)
         self._share = 1.0 - math.exp(-IMU_PERIOD_S / rotor_lag_s)
         self.sensors = PaperSensors(errors, rng, quaternion)
         noise = AccelerometerFilterNoise(
@@ -103,10 +104,7 @@ class Onboard:
         self._rate = sensors.turn(quaternion)
         self._force = force = sensors.specific_force(acceleration, quaternion)
         body_to_world = rotation_matrix(sensors.quaternion)
-        model, battery = self._airframe.model, self._airframe.battery
-        asked = static_thrust_m_s2(
-            command, voltage_v, model.k_thrust_m_s2, battery.reference_voltage_v, battery.thrust_exponent
-        )
+        asked = self._thrust_map.k_thrust_m_s2(voltage_v) * command
         self._thrust += self._share * (asked - self._thrust)
         self._samples += 1
         positions_due = self._samples % POSITIONS_EVERY == 0

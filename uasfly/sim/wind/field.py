@@ -42,8 +42,10 @@ class WindField:
     def __init__(self, settings: WindSettings, rng: np.random.Generator, step_s: float) -> None:
         self._steady = SteadyWind(settings.mean)
         self._along_x, self._along_y = self._steady.direction_in_world
-        self._gusts = DrydenGusts(self._steady.w20_m_s, rng, step_s) if settings.gusts == "dryden" else None
-        self._sines = SumOfSines(self._steady.w20_m_s, rng, step_s) if settings.gusts == "sum_of_sines" else None
+        self._gusts: DrydenGusts | SumOfSines | None = None
+        if settings.gusts != "none":
+            kind = DrydenGusts if settings.gusts == "dryden" else SumOfSines
+            self._gusts = kind(self._steady.w20_m_s, rng, step_s)
         self._jets = tuple(Jet(jet, rng, step_s) for jet in settings.jets)
 
     def step(self, position_in_world: Vector, velocity_in_world: Vector, engaged_time_s: float | None) -> WindAtVehicle:
@@ -58,10 +60,10 @@ class WindField:
         x, y, z = self._steady.at(position_in_world[2])
         if self._gusts is not None:
             vx, vy, vz = velocity_in_world
-            airspeed = math.sqrt((x - vx) ** 2 + (y - vy) ** 2 + (z - vz) ** 2)
-            x, y, z = self._with_gust((x, y, z), self._gusts.step(position_in_world[2], airspeed))
-        elif self._sines is not None:
-            x, y, z = self._with_gust((x, y, z), self._sines.step(position_in_world[2]))
+            u, v, w = self._gusts.step(position_in_world[2], math.sqrt((x - vx) ** 2 + (y - vy) ** 2 + (z - vz) ** 2))
+            x += self._along_x * u - self._along_y * v
+            y += self._along_y * u + self._along_x * v
+            z += w
         jet_x = jet_y = jet_z = 0.0
         for jet in self._jets:
             dx, dy, dz = jet.step(position_in_world, engaged_time_s)
@@ -69,8 +71,3 @@ class WindField:
             jet_y += dy
             jet_z += dz
         return WindAtVehicle((x, y, z), (jet_x, jet_y, jet_z))
-
-    def _with_gust(self, mean: Vector, gust: Vector) -> Vector:
-        (x, y, z), (u, v, w) = mean, gust
-        along_x, along_y = self._along_x, self._along_y
-        return x + (along_x * u - along_y * v), y + (along_y * u + along_x * v), z + w

@@ -60,8 +60,8 @@ class SumOfSines:
         self._height_m = 0.0
         self._steps = 0
 
-    def step(self, height_m: float) -> tuple[float, float, float]:
-        """Gust (u, v, w) [m/s] one step later, at a height above the ground [m]."""
+    def step(self, height_m: float, airspeed_m_s: float) -> tuple[float, float, float]:  # noqa: ARG002
+        """Gust (u, v, w) [m/s] one step later, at a height above the ground [m]; the airspeed plays no part."""
         height = min(max(height_m, LOWEST_HEIGHT_M), HIGHEST_HEIGHT_M)
         if abs(height - self._height_m) > RENEWAL * self._height_m:
             self._height_m = height

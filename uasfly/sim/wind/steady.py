@@ -11,8 +11,8 @@ class SteadyWind:
     """Mean wind at any height above the ground (world z = 0), and the direction its gusts are aligned with.
 
     The boundary layer is v(z) = (v*/k) ln(z/z0) (Waslander & Wang 2009), written with the speed at 10 m in place of
-    v*/k: v(z) = v(10 m) ln(z/z0) / ln(10 m/z0), and 0 where z <= z0. The paper's upper bound b v*/(2 omega_e sin
-    latitude) is 118 m for 8 m/s at 10 m and 30 m for 2 m/s (latitude 45 deg); the profile is not cut there.
+    v*/k: v(z) = v(10 m) ln(z/z0) / ln(10 m/z0), and 0 where z <= z0. The paper's upper bound (`BoundaryLayer.top_m`)
+    is 117 m for 8 m/s at 10 m and 29 m for 2 m/s (latitude 45 deg); the profile is not cut there.
 
     Attributes:
         direction_in_world: (x, y) unit vector that the wind blows along; (1, 0) where it is calm.
