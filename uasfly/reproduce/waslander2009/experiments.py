@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -138,6 +139,7 @@ def _hover_rows(records: Records, extent: Extent) -> list[Row]:
             )
         rows.append(Row(HOVER, f"{TITLES[name]}: RMS", "m", None, record.rms(), None, what))
         rows.append(Row(HOVER, f"{TITLES[name]}: RMS, horizontal", "m", None, record.rms(slice(0, 2)), None, what))
+    rows += _order_rows(records, HOVER)
     for name, paper in CONTROLLERS.items():
         record, title = records[HOVER, name, BY_ALL], f"{TITLES[name]}, {BY_ALL}"
         value, note = float(record.largest().max()), "5 cm of white GPS noise at 10 Hz outweigh the wind"
@@ -152,7 +154,18 @@ def _path_rows(records: Records, experiment: str) -> list[Row]:
     rows: list[Row] = []
     for name in CONTROLLERS:
         rows += _stray(experiment, TITLES[name], records[experiment, name, BY_ACCELEROMETER], BY_ACCELEROMETER)
+    rows += _order_rows(records, experiment)
     return rows + _stray(experiment, "uasfly's NMPC", records[experiment, "nmpc", BY_OBSERVER], BY_OBSERVER)
+
+
+def _order_rows(records: Records, experiment: str) -> list[Row]:
+    """Whether each of the paper's controllers strays less than the one before, by RMS."""
+    rows = []
+    for before, after in pairwise(CONTROLLERS):
+        ratio = records[experiment, after, BY_ACCELEROMETER].rms() / records[experiment, before, BY_ACCELEROMETER].rms()
+        note = f"paper: below 1; {'so here' if ratio < 1.0 else 'NOT so here'}"
+        rows.append(Row(experiment, f"RMS, {TITLES[after]} / {TITLES[before]}", "", None, ratio, None, note))
+    return rows
 
 
 def _stray(experiment: str, title: str, record: Record, note: str) -> list[Row]:
