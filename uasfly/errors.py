@@ -34,6 +34,10 @@ class FileError(UasflyError):
             self.problems.append(f"and more than {MOST_PROBLEMS} problems in all; mend these first")
         super().__init__("\n".join(f"{path}: {problem}" for problem in self.problems))
 
+    def __reduce__(self) -> tuple[type[FileError], tuple[str, list[str]]]:
+        """How it travels between processes; by the text alone it could not be made again, and a pool would hang."""
+        return type(self), (self.path, self.problems)
+
 
 class LinkError(UasflyError):
     """The vehicle cannot be reached, or the connection to it cannot be opened."""
