@@ -12,7 +12,7 @@ import numpy as np
 from uasfly.drivers.eyes import make_eyes
 from uasfly.drivers.plan import FlightPlan, build_pilot
 from uasfly.drivers.sight import TrueMarkers
-from uasfly.drivers.watching import Cycle, Watch
+from uasfly.drivers.watching import Cycle, Watch, Witness
 from uasfly.flight.choices import Engage
 from uasfly.flight.summary import SummaryCollector
 from uasfly.link.in_process import InProcessLink
@@ -23,7 +23,9 @@ from uasfly.trajectories.mission_trajectory import LONGEST_S
 LONGEST_FLIGHT_S = LONGEST_S + 600.0  # the legs, and more than all time-outs of the other phases together
 
 
-def rehearse(plan: FlightPlan, log: Path | None = None, watch: Watch | None = None) -> dict[str, Any]:
+def rehearse(
+    plan: FlightPlan, log: Path | None = None, watch: Watch | None = None, witness: Witness | None = None
+) -> dict[str, Any]:
     """Fly a plan and return its summary.
 
     The same plan gives the same log, bit for bit; only the summary's times and real-time factor depend on the machine.
@@ -32,6 +34,7 @@ def rehearse(plan: FlightPlan, log: Path | None = None, watch: Watch | None = No
         plan: what to fly; it must have a scenario and a plant.
         log: file for the flight log, None for none.
         watch: called with each step's status and what the driver knows of the cycle (progress, capture).
+        witness: called with each step's status and all that the summary is made from.
 
     Raises:
         FileError: when the log cannot be opened.
@@ -74,9 +77,12 @@ def rehearse(plan: FlightPlan, log: Path | None = None, watch: Watch | None = No
             solve_ms = None if result.control is None else result.control.solve_ms
             cycle_ms = (time.perf_counter() - begun) * 1e3
             summary.timed(solve_ms, cycle_ms)
-            summary.cycle(result.status, (*samples, truth), true_markers.datum(pilot.observer))
+            seen, datum = (*samples, truth), true_markers.datum(pilot.observer)
+            summary.cycle(result.status, seen, datum)
+            if witness is not None:
+                witness(result.status, seen, datum)
             if writer is not None:
-                for message in (*samples, truth, *result.requests, result.setpoint, result.status):
+                for message in (*seen, *result.requests, result.setpoint, result.status):
                     if message is not None:
                         writer.write(message, now_s)
             if watch is not None:
