@@ -209,7 +209,7 @@ def _step_rows(records: Records) -> list[Row]:
     flown = [flight for name in TRACKING_CM for flight in records[name]]
     shipped, paper_grid = _means(flown), _means(records[e.PAPER_GRID])
     grid = f"{e.PAPER_NODES} x {e.PAPER_INTERVAL_S:g} s"
-    here = "on this computer, not on the paper's NUC i5, and timed by the clock: no two runs give the same"
+    here = "one real-time iteration, on this computer and not on the paper's NUC i5; no two runs give the same"
     p99 = [float(np.percentile(flight.solve_ms, 99)) for flight in records[e.PAPER_GRID]]
     return [
         mean_row(title, "mean, 3 s in 25 nodes as shipped", "ms", STEP_MS, shipped, here),
