@@ -31,6 +31,7 @@ from uasfly.vision.calibration.mounting.observations import Motion, Sightings, T
 from uasfly.vision.calibration.mounting.start import first_rotation
 
 FEWEST = 30  # sightings
+GUESSED_RAD = 0.35  # a rotation that is believed no better may also be all wrong
 MOST = 3000  # more than these are thinned out evenly
 _GATE = 22.46  # chi-square of 6 degrees of freedom, 99.9 %
 _REJECTED = 4.0 * _GATE
@@ -41,8 +42,8 @@ _NOISE_SPREAD = 1.5  # sigma of the prior of the disturbances' logarithms
 _NOISE_STEP = 1e-3
 _NOISE_SETTLED = 0.05
 _NOISE_RANGE = 5.0
-_DAMPING, _MOST_DAMPING = 1e-3, 1e6
-_GUESSED_RAD = 0.5  # a rotation that is believed no better may be all wrong
+_DAMPING, _MOST_DAMPING = 1e-3, 1e4
+_NO_GAIN = 1e-6  # of the cost, in squared sigmas
 _SURE_RAD, _SURE_M = 1e-5, 1e-5
 _VAGUE_BUNDLE = 1e-8  # information of a bundle's place and rotation
 
@@ -59,8 +60,8 @@ class Belief:
 
     camera_to_body: Array
     lever: Array
-    turn_sigma_rad: float = 1.0
-    lever_sigma_m: float = 1.0
+    turn_sigma_rad: float = GUESSED_RAD
+    lever_sigma_m: float = 0.5
     heading_sigma_rad: float = math.radians(3.0)
     offset_sigma_s: float = 0.1
 
@@ -173,8 +174,9 @@ class _Problem:
     def __init__(self, sightings: Sightings, track: Track, knots: Knots, belief: Belief) -> None:
         self._sightings, self._track, self._knots, self._belief = sightings, track, knots, belief
         place, turned = track.at(0.0), belief.camera_to_body
-        if belief.turn_sigma_rad >= _GUESSED_RAD:
+        if belief.turn_sigma_rad >= GUESSED_RAD:
             turned = first_rotation(turned, place, sightings)
+            self._belief = replace(belief, camera_to_body=turned)
         bundles = bundles_seen(turned, belief.lever, place, sightings)
         self._unknowns = Unknowns(turned, belief.lever, 0.0, 0.0, *bundles)
         self._values = np.zeros((len(knots.time_s), 6))
@@ -229,6 +231,8 @@ class _Problem:
         damping = _DAMPING
         _, result = self._normal(self._unknowns, self._values, damping)
         for _ in range(_STEPS):
+            if result.cost - result.least < _NO_GAIN:
+                return
             unknowns, values = self._unknowns.moved(result.step), self._values + result.knots
             tried = self._normal(unknowns, values)[1]
             if tried.cost <= result.cost * (1.0 + 1e-12):
