@@ -104,7 +104,7 @@ def test_a_rehearsed_flight_gives_the_true_mounting_back(rehearsed: Path, tmp_pa
     placement = before.transform_camera_to_body
     true = Rotation.from_matrix(placement.rotation) * Rotation.from_rotvec((1.5, -2.0, 1.0), degrees=True)
     turn = true * Rotation.from_matrix(camera.transform_camera_to_body.rotation).inv()
-    moved = placement.position + (0.03, -0.02, 0.01) - camera.transform_camera_to_body.position
+    moved = placement.position + np.array((0.03, -0.02, 0.01)) - camera.transform_camera_to_body.position
     assert turn.magnitude() < math.radians(0.25)
     error = np.concatenate((turn.as_rotvec(), moved))
     assert error @ np.linalg.solve(np.array(record["covariance"]), error) < chi2.ppf(0.999, 6)
@@ -164,12 +164,13 @@ def test_bad_logs_are_refused_with_the_reason(tmp_path: Path) -> None:
     camera = {"camera": load_file(VGA, Camera).model_dump(mode="json")}
     text = tmp_path / "text.mcap"
     text.write_text("hello")
-    for name, description, expected in (
-        ("blind.mcap", {"sight": None}, "flight with a camera"),
-        ("odd.mcap", {"sight": {"camera": {"name": "x"}}}, "cannot be used"),
-        ("empty.mcap", {"sight": camera}, "sightings of a bundle"),
-    ):
-        LogWriter(tmp_path / name, description).close()
+    cases: tuple[tuple[str, object, str], ...] = (
+        ("blind.mcap", None, "flight with a camera"),
+        ("odd.mcap", {"camera": {"name": "x"}}, "cannot be used"),
+        ("empty.mcap", camera, "sightings of a bundle"),
+    )
+    for name, sight, expected in cases:
+        LogWriter(tmp_path / name, {"sight": sight}).close()
         code, told = run(tmp_path / name)
         assert code == 2
         assert expected in told

@@ -56,7 +56,7 @@ def fly(
     """A flight in slow circles, with turns and tilts as asked for; everything else is drawn."""
     rng = np.random.default_rng(seed)
     count = round(duration_s / SAMPLE_S)
-    time_s = SAMPLE_S * np.arange(count)
+    time_s = SAMPLE_S * np.arange(count, dtype=np.float64)
     phase = rng.uniform(0.0, 2.0 * math.pi, 6)
     rates = np.array((0.7, 0.9, 0.5))
     position = np.array((way_m, way_m, 0.3 * way_m)) * np.sin(rates * time_s[:, None] + phase[:3]) + (0.0, 0.0, 1.6)

@@ -17,7 +17,7 @@ from uasfly.vision.calibration.mounting import drift
 from uasfly.vision.calibration.mounting.drift import Knots, Noise
 from uasfly.vision.calibration.mounting.fit import Belief, MountingFit, fit_mounting
 from uasfly.vision.calibration.mounting.missing import Missing, known, missing
-from uasfly.vision.calibration.mounting.model import BUNDLES, HEADING, MOUNTING, OFFSET, Unknowns, linearise
+from uasfly.vision.calibration.mounting.model import BUNDLES, MOUNTING, Unknowns, linearise
 from uasfly.vision.calibration.mounting.observations import Sightings, Track
 
 RUNS = 15

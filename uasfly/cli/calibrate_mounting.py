@@ -9,16 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from uasfly.cli import options
+from uasfly.cli.fly import SystemId
+
 if TYPE_CHECKING:
     from uasfly.camera import Camera
-    from uasfly.vision.calibration.mounting.fit import MountingFit
+    from uasfly.drivers.sight import SightOptions
+    from uasfly.vision.calibration.mounting.fit import Belief, MountingFit
 
 EXIT_UNKNOWN = 1
 _AXES = ("x", "y", "z")
 
 
 def mounting(
-    log: Path = typer.Argument(help="Flight log (--log of a flight with --camera) with a bundle in sight."),
+    log: Path = typer.Argument(
+        help="Flight log (--log of a flight with --camera) with a bundle in sight; with --connect it is recorded first."
+    ),
     camera: str | None = typer.Option(
         None, "--camera", help="Camera file that all but the mounting is taken from; the log's camera when not given."
     ),
@@ -32,20 +38,28 @@ def mounting(
         3.0, "--heading-sigma", min=0.01, max=90.0, help="Constant error of the vehicle's heading (compass), in deg."
     ),
     picture: Path | None = typer.Option(None, "--picture", help="Residuals as a PNG; beside --out when not given."),
+    connect: str | None = typer.Option(
+        None, "--connect", help="Record the log first, from a vehicle that is carried by hand, disarmed: its URL."
+    ),
+    bundles: options.Bundles = None,
+    camera_source: options.CameraSource = None,
+    duration: float = typer.Option(60.0, "--duration", min=1.0, max=3600.0, help="Of that recording, in s."),
+    system_id: SystemId = None,
     as_json: bool = typer.Option(False, "--json", help="Print JSON instead of a table."),
 ) -> None:
     """Calibrate rotation and place of a camera on the vehicle from a log, and write them into a camera file.
 
     Needs turns about the vertical, tilts to all sides and some way, with a bundle at rest in sight; what is missing is
-    told. Exit code 1: the mounting is not known well enough, nothing was written.
+    told. Exit code 1: the mounting is not known well enough, nothing was written. With --connect nothing flies: carry
+    the vehicle over the bundle, Ctrl-C ends the recording.
 
     Example: [bold]uasfly calibrate mounting flight.mcap --camera my_camera.yaml --out my_camera.yaml --overwrite[/]
     """
     from datetime import date
 
     from uasfly.camera import Camera
-    from uasfly.cli.output import check_writable
     from uasfly.drivers.mounting_log import read_mounting_log
+    from uasfly.drivers.sight import SightOptions
     from uasfly.errors import FileError, UasflyError
     from uasfly.files import find_file, load_file
     from uasfly.vision.calibration.camera_file import camera_text, text_of, with_fields, write_camera
@@ -54,21 +68,18 @@ def mounting(
     from uasfly.vision.calibration.mounting.missing import missing
     from uasfly.vision.calibration.report import can_draw
 
-    check_writable(out, "camera file")
-    check_writable(picture, "picture")
-    if out is not None and out.exists() and not overwrite:
-        raise FileError(
-            str(out), ["this file is there already; add --overwrite to change its mounting, or name another"]
-        )
-    if picture is not None and not can_draw():
-        raise UasflyError("--picture: drawing needs matplotlib; install it (pip install 'uasfly[vision]')")
+    _check_outputs(out, picture, overwrite=overwrite)
     base = None if camera is None else find_file("camera", camera)
+    if connect is not None:
+        _record(log, connect, SightOptions(camera, tuple(bundles or ()), camera_source), duration, system_id)
+    elif bundles or camera_source:
+        raise UasflyError("--bundle and --camera-source belong to --connect: a log knows its bundles")
     recorded = read_mounting_log(log)
     stated = recorded.camera if base is None else load_file(base, Camera)
     placement = stated.transform_camera_to_body
     believed = Belief(placement.rotation, placement.position, heading_sigma_rad=math.radians(heading_sigma))
     if prior:
-        believed = believed.trusting(math.radians(stated.mounting_sigma_deg), stated.mounting_sigma_m)
+        believed = _trusting(believed, stated)
     try:
         fit = fit_mounting(recorded.motion, recorded.sightings, believed)
     except UasflyError as error:
@@ -97,6 +108,49 @@ def mounting(
         _print_table(fit, stated, record)
     if lacks is not None:
         raise typer.Exit(EXIT_UNKNOWN)
+
+
+def _check_outputs(out: Path | None, picture: Path | None, *, overwrite: bool) -> None:
+    from uasfly.cli.output import check_writable
+    from uasfly.errors import FileError, UasflyError
+    from uasfly.vision.calibration.report import can_draw
+
+    check_writable(out, "camera file")
+    check_writable(picture, "picture")
+    if out is not None and out.exists() and not overwrite:
+        raise FileError(
+            str(out), ["this file is there already; add --overwrite to change its mounting, or name another"]
+        )
+    if picture is not None and not can_draw():
+        raise UasflyError("--picture: drawing needs matplotlib; install it (pip install 'uasfly[vision]')")
+
+
+def _trusting(belief: Belief, camera: Camera) -> Belief:
+    from uasfly.errors import UasflyError
+
+    if not (camera.mounting_sigma_deg > 0.0 and camera.mounting_sigma_m > 0.0):
+        raise UasflyError(
+            f"--prior: expected mounting_sigma_m and mounting_sigma_deg above 0 in the camera file {camera.name}, "
+            f"found {camera.mounting_sigma_m:g} and {camera.mounting_sigma_deg:g}: say how well it was measured"
+        )
+    return belief.trusting(math.radians(camera.mounting_sigma_deg), camera.mounting_sigma_m)
+
+
+def _record(log: Path, url: str, sight: SightOptions, duration_s: float, system_id: int | None) -> None:
+    from uasfly.cli.output import check_writable
+    from uasfly.cli.progress import RecordingProgress
+    from uasfly.drivers.hand_held import record_hand_held
+    from uasfly.drivers.sight import load_sight
+    from uasfly.errors import UasflyError
+
+    check_writable(log, "log")
+    seen_with = load_sight(sight, None, None)
+    if seen_with is None or not sight.bundles:
+        raise UasflyError(
+            "--connect needs the camera's file, its frames and a bundle: --camera, --camera-source, --bundle"
+        )
+    with RecordingProgress() as progress:
+        record_hand_held(url, seen_with, log, duration_s, progress.update, system_id)
 
 
 def _print_table(fit: MountingFit, stated: Camera, record: dict[str, Any]) -> None:
