@@ -121,10 +121,11 @@ def test_a_rehearsed_flight_gives_the_true_mounting_back(rehearsed: Path, tmp_pa
     assert {path.name for path in tmp_path.iterdir()} == {"mine.yaml", "mine.png"}
 
 
-def test_without_a_camera_file_the_logs_own_is_completed(rehearsed: Path, tmp_path: Path) -> None:
+def test_without_a_camera_file_the_logs_own_is_completed(tmp_path: Path) -> None:
     """And the table names values, sigmas and what was written."""
     out = tmp_path / "new.yaml"
-    code, text = run(rehearsed, "--out", out)
+    log = write_log(tmp_path / "a.mcap", fly(20, duration_s=20.0), load_file(VGA, Camera))
+    code, text = run(log, "--out", out)
     assert code == 0, text
     assert "new.yaml: mounting written" in text
     assert "sightings left out" in text
@@ -134,7 +135,7 @@ def test_without_a_camera_file_the_logs_own_is_completed(rehearsed: Path, tmp_pa
 def test_a_mounting_that_is_not_known_is_not_written(tmp_path: Path) -> None:
     """Exit code 1 and what to do; with the file's own sigmas as a measurement it is known and written."""
     camera = load_file(VGA, Camera)
-    log = write_log(tmp_path / "still.mcap", fly(21, yaw_rad=0.0, tilt_rad=0.002), camera)
+    log = write_log(tmp_path / "still.mcap", fly(21, duration_s=15.0, yaw_rad=0.0, tilt_rad=0.002), camera)
     out = tmp_path / "mine.yaml"
     code, text = run(log, "--camera", VGA, "--out", out)
     assert code == 1
@@ -205,3 +206,21 @@ def test_a_camera_in_memory_becomes_a_file_and_back(tmp_path: Path) -> None:
     with pytest.raises(FileError):
         write_camera(tmp_path / "bad.yaml", text_of(camera).replace("fx:", "f:"))
     assert not (tmp_path / "bad.yaml").exists()
+
+
+def test_options_that_do_not_go_together_are_refused(tmp_path: Path) -> None:
+    """A recording needs camera, frames and bundle; a log needs none of them; sigmas of zero are no measurement."""
+    log = write_log(tmp_path / "a.mcap", fly(25, duration_s=8.0), load_file(VGA, Camera))
+    code, told = run(log, "--bundle", "four_36h11")
+    assert code == 2
+    assert "belong to --connect" in told
+    code, told = run(tmp_path / "new.mcap", "--connect", "udpin://127.0.0.1:1", "--camera", VGA)
+    assert code == 2
+    assert "--camera-source" in told
+    sure = tmp_path / "sure.yaml"
+    sure.write_text(VGA.read_text().replace("mounting_sigma_m: 0.005", "mounting_sigma_m: 0"))
+    code, told = run(log, "--camera", sure, "--prior")
+    assert code == 2
+    assert "say how well it was measured" in told
+    code, told = run(log, "--camera", "no_such")
+    assert code == 2

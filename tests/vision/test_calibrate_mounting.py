@@ -127,7 +127,7 @@ def test_the_truth_is_inside_the_sigmas() -> None:
 def test_the_log_itself_tells_how_large_drift_and_scatter_are() -> None:
     """From a guess that is wrong by factors; what is found is right to a quarter, and the mounting is known as well."""
     noise = Noise(0.5, 0.05, 0.0005, 0.15, 0.002)
-    flight = fly(3, duration_s=60.0, noise=noise)
+    flight = fly(3, duration_s=50.0, noise=noise)
     fit = fitted(flight, None)
     for name in ("sighting_scale", "position_m", "walk_m_sqrt_s", "wander_rad"):
         assert getattr(fit.noise, name) == pytest.approx(getattr(noise, name), rel=0.25), name
@@ -215,6 +215,15 @@ def test_without_any_turn_nothing_is_learnt_of_the_lever_arm() -> None:
     assert turned.lever_sigma_m[2] > 0.3
     assert turned.turn_sigma_rad[2] > 0.7 * fly(9).belief().heading_sigma_rad
     assert turned.turn_sigma_rad[:2].max() < math.radians(0.5)
+
+
+def test_a_vehicle_at_rest_calibrates_nothing() -> None:
+    """However long it stands: scatter of its attitude looks like tilts, but is not taken for them."""
+    fit = fitted(fly(13, yaw_rad=0.0, tilt_rad=0.0, way_m=0.0))
+    belief = fly(13).belief()
+    np.testing.assert_allclose(fit.turn_sigma_rad, belief.turn_sigma_rad, rtol=0.05)
+    np.testing.assert_allclose(fit.lever_sigma_m, belief.lever_sigma_m, rtol=0.05)
+    assert fit.offset_sigma_s > 0.5 * belief.offset_sigma_s
 
 
 def test_what_is_known_already_counts() -> None:

@@ -174,7 +174,7 @@ def _print_table(fit: MountingFit, stated: Camera, record: dict[str, Any]) -> No
     console = Console()
     console.print(table)
     told = [
-        f"time offset {1000.0 * record['time_offset_s']:+.1f} ms (sigma {1000.0 * record['time_offset_sigma_s']:.1f}); "
+        f"time offset {1000.0 * record['time_offset_s']:+.2f} ms (sigma {1000.0 * record['time_offset_sigma_s']:.2g}); "
         f"heading error {record['heading_error_deg']:+.2f} deg (sigma {record['heading_error_sigma_deg']:.2f})",
         f"residuals {1000.0 * seen['position_rms_m']:.1f} mm and {seen['rotation_rms_deg']:.2f} deg RMS; "
         f"{seen['left_out']} sightings left out",

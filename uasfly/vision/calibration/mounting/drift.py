@@ -127,6 +127,14 @@ class Solved:
     distance: Array
 
 
+def covariance(linear: Linearised, noise: Noise) -> Array:
+    """Covariance (n, 6, 6) of the residuals, without the knots' errors."""
+    turned, detector = noise.attitude_rad**2, noise.sighting_scale**2
+    S: Array = detector * linear.seen + turned * linear.by_attitude @ linear.by_attitude.transpose(0, 2, 1)
+    S[:, range(3), range(3)] += noise.position_m**2
+    return S
+
+
 def solve(
     linear: Linearised,
     weights: Array,
@@ -147,12 +155,7 @@ def solve(
         prior: of the unknowns: (size,) information and (size,) how far they are from where it is centred.
         damping: share of the information's diagonal that is added for the step (Levenberg-Marquardt).
     """
-    S = (
-        noise.sighting_scale** 2 * linear.seen
-        + noise.attitude_rad** 2 * linear.by_attitude @ linear.by_attitude.transpose(0, 2, 1)
-    )
-    S[:, range(3), range(3)] += noise.position_m**2
-    root = np.linalg.cholesky(S)
+    root = np.linalg.cholesky(covariance(linear, noise))
     columns = np.concatenate((linear.by_unknowns, linear.by_motion, linear.residuals[..., None]), axis=2)
     white = np.linalg.solve(root, columns)
     distance = (white[..., -1] ** 2).sum(axis=1)

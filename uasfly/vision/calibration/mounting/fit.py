@@ -28,6 +28,7 @@ from uasfly.vision.calibration.mounting.model import (
     linearise,
 )
 from uasfly.vision.calibration.mounting.observations import Motion, Sightings, Track, followed
+from uasfly.vision.calibration.mounting.pretence import known_covariance, pretended
 from uasfly.vision.calibration.mounting.start import first_rotation
 
 FEWEST = 30  # sightings
@@ -80,12 +81,13 @@ class MountingFit:
 
     Attributes:
         unknowns: at the optimum.
-        covariance: (size, size) of their errors, in the order of `model`.
+        covariance: (8, 8) of mounting, heading and time offset, in the order of `model`.
         noise: disturbances that the log shows.
         sightings: those that were used; place, knots, values: the motion there and its errors.
         residuals: (n, 6) m, body axes, and rad, bundle axes, with the motion's errors taken off.
         distance: (n,) squared length of the residuals in sigmas. weights: (n,), 0 for what was left out.
         information: (size,) of the unknowns before the log was looked at.
+        pretence: (size, size) information that is none, see `pretence`.
     """
 
     unknowns: Unknowns
@@ -99,6 +101,7 @@ class MountingFit:
     distance: Array
     weights: Array
     information: Array
+    pretence: Array
 
     @property
     def turn_sigma_rad(self) -> Array:
@@ -200,9 +203,11 @@ class _Problem:
                     break
         self._descend()
         linear, result = self._normal(self._unknowns, self._values)
+        place, errors = self._track.at(self._unknowns.offset_s), self._knots.between(self._values)
+        pretence = pretended(linear, self._unknowns, place, self._sightings, errors, self._weights, self._noise)
         return MountingFit(
             self._unknowns,
-            np.asarray(np.linalg.inv(result.information), dtype=float),
+            known_covariance(result.information, pretence, self._information),
             self._noise,
             self._sightings,
             self._track,
@@ -212,6 +217,7 @@ class _Problem:
             result.distance,
             self._weights,
             self._information,
+            pretence,
         )
 
     def _weigh(self, *, reject: bool) -> None:

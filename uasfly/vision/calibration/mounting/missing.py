@@ -19,6 +19,7 @@ from uasfly.vision.calibration.mounting.drift import Knots
 from uasfly.vision.calibration.mounting.fit import MountingFit, worst_sigmas
 from uasfly.vision.calibration.mounting.model import linearise
 from uasfly.vision.calibration.mounting.observations import Place, Sightings
+from uasfly.vision.calibration.mounting.pretence import known_covariance
 from uasfly.vision.rotations import rotations
 
 LIMIT_RAD = math.radians(1.0)  # a mounting that is known no better is not known
@@ -109,7 +110,7 @@ def _expected(fit: MountingFit, motions: tuple[str, ...]) -> tuple[float, float]
     weights = np.concatenate((fit.weights, np.ones(count)))
     zeros = np.zeros(unknowns.size)
     result = drift.solve(linear, weights, fit.noise, knots, values, (fit.information, zeros))
-    return worst_sigmas(np.asarray(np.linalg.inv(result.information), dtype=float))
+    return worst_sigmas(known_covariance(result.information, fit.pretence, fit.information))
 
 
 def _moved(here: Place, motion: str) -> Place:
