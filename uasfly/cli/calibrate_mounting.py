@@ -64,8 +64,9 @@ def mounting(
     from uasfly.files import find_file, load_file
     from uasfly.vision.calibration.camera_file import camera_text, text_of, with_fields, write_camera
     from uasfly.vision.calibration.mounting import report
-    from uasfly.vision.calibration.mounting.fit import Belief, fit_mounting
+    from uasfly.vision.calibration.mounting.fit import Belief
     from uasfly.vision.calibration.mounting.missing import missing
+    from uasfly.vision.calibration.mounting.shutter import fit_through_shutter
     from uasfly.vision.calibration.report import can_draw
 
     _check_outputs(out, picture, overwrite=overwrite)
@@ -81,7 +82,7 @@ def mounting(
     if prior:
         believed = _trusting(believed, stated)
     try:
-        fit = fit_mounting(recorded.motion, recorded.sightings, believed)
+        fit = fit_through_shutter(recorded.motion, recorded.sightings, believed, recorded.camera, recorded.bundles)
     except UasflyError as error:
         raise FileError(str(log), [str(error)]) from None
     lacks = missing(fit)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from uasfly.bundle import Bundle
 from uasfly.camera import Camera
 from uasfly.errors import FileError
 from uasfly.messages import MarkerSample, OdometrySample
@@ -24,12 +25,14 @@ class MountingLog:
     Attributes:
         camera: the file that the sightings were made with; its mounting is taken out of them.
         motion: of the vehicle. sightings: of bundles in camera axes.
+        bundles: that were seen through the camera's shutter; none where the sightings are drawn by a noise model.
         complete: whether the log has its end.
     """
 
     camera: Camera
     motion: Motion
     sightings: Sightings
+    bundles: tuple[Bundle, ...]
     complete: bool
 
 
@@ -40,7 +43,7 @@ def read_mounting_log(path: Path) -> MountingLog:
         FileError: it is no flight log, was flown without a camera, or holds no odometry or no sightings.
     """
     reader = LogReader(path)
-    camera = _camera(path, reader.description())
+    camera, bundles = _sight(path, reader.description())
     motion: list[OdometrySample] = []
     seen: list[MarkerSample] = []
     for entry in reader.messages(OdometrySample, MarkerSample):
@@ -56,19 +59,22 @@ def read_mounting_log(path: Path) -> MountingLog:
     ]
     if problems:
         raise FileError(str(path), problems)
-    return MountingLog(camera, _motion(motion), _sightings(camera, seen), reader.complete)
+    return MountingLog(camera, _motion(motion), _sightings(camera, seen), bundles, reader.complete)
 
 
-def _camera(path: Path, description: dict[str, Any]) -> Camera:
+def _sight(path: Path, description: dict[str, Any]) -> tuple[Camera, tuple[Bundle, ...]]:
     sight = description.get("sight")
     if not isinstance(sight, dict):
         raise FileError(str(path), ["expected the log of a flight with a camera (--camera), found one without"])
     try:
-        return Camera.model_validate(sight.get("camera"))
+        camera = Camera.model_validate(sight.get("camera"))
+        bundles = tuple(Bundle.model_validate(bundle) for bundle in sight.get("bundles") or ())
     except ValidationError as error:
         raise FileError(
-            str(path), [f"the camera in its description cannot be used: {error.errors()[0]['msg']}"]
+            str(path), [f"the camera or a bundle in its description cannot be used: {error.errors()[0]['msg']}"]
         ) from None
+    # the noise model of rehearsals knows no rows
+    return camera, () if sight.get("modelled") else bundles
 
 
 def _motion(samples: list[OdometrySample]) -> Motion:
