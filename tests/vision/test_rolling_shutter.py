@@ -53,8 +53,8 @@ def test_a_bent_bundle_is_straightened(seed: int) -> None:
     place = Place(
         rng.uniform((-0.2, -0.2, 1.6), (0.2, 0.2, 2.0))[None],
         Rotation.from_rotvec(rng.normal(0.0, 0.05, 3)).as_matrix()[None],
-        rng.normal(0.0, 0.5, (1, 3)),
-        rng.normal(0.0, 0.6, (1, 3)),
+        rng.normal(0.0, 0.4, (1, 3)),
+        rng.normal(0.0, 0.4, (1, 3)),
     )
     unknowns = Unknowns(DOWN.as_matrix(), np.array((0.05, 0.0, -0.05)), 0.0, 0.0, np.zeros((1, 3)), np.eye(3)[None])
     bundle = np.array((0.05, -0.05, 0.0)), Rotation.from_euler("Z", 0.4).as_matrix()
@@ -66,7 +66,7 @@ def test_a_bent_bundle_is_straightened(seed: int) -> None:
     found = Pose(straight.position[0], quaternion_of(straight.rotation[0]))
     before, after = np.abs(bent.minus(true)), np.abs(found.minus(true))
     assert before[:3].max() > 0.002
-    assert before[3:].max() > 0.005
+    assert before[3:].max() > 0.01
     assert after[:3].max() < 0.1 * before[:3].max()
     assert after[3:].max() < 0.1 * before[3:].max()
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from uasfly.bundle import Bundle
 from uasfly.camera import Camera
@@ -18,9 +17,12 @@ from uasfly.vision.calibration.mounting.drift import Noise
 from uasfly.vision.calibration.mounting.fit import Belief, MountingFit, fit_mounting
 from uasfly.vision.calibration.mounting.model import Unknowns
 from uasfly.vision.calibration.mounting.observations import Motion, Place, Sightings, Track
-from uasfly.vision.rotations import skews
+from uasfly.vision.pose import huber_weights
+from uasfly.vision.rotations import rotations, skews
 
 _FEWEST = 4  # corners in the picture
+_STEPS = 40
+_SETTLED = 1e-4  # of metres and radians
 _PASSES = 2  # with the mounting found so far
 
 
@@ -55,7 +57,7 @@ def fit_through_shutter(
 def straightened(
     sightings: Sightings, place: Place, unknowns: Unknowns, camera: Camera, bundles: tuple[Bundle, ...]
 ) -> Sightings:
-    """The poses without what the rolling shutter has done, to first order.
+    """The poses to which the shutter would make those that were found.
 
     Args:
         sightings: as they were made, of frames whose time is that of their middle row.
@@ -65,26 +67,59 @@ def straightened(
         bundles: where the corners are.
     """
     position, rotation = sightings.position.copy(), sightings.rotation.copy()
-    corners = {b.marker_id: np.concatenate([marker.corners for marker in b.markers]) for b in bundles}
     turning, moving = _twist(place, unknowns)
-    for index in range(len(sightings.time_s)):
-        points = corners.get(sightings.ids[sightings.bundle[index]])
-        if points is None:
-            continue
-        seen = points @ rotation[index].T + position[index]
-        pixels, by_point = camera.project_with_jacobian(seen)
-        inside = (pixels >= 0.0).all(axis=1) & (pixels <= (camera.width_px - 1.0, camera.height_px - 1.0)).all(axis=1)
-        if inside.sum() < _FEWEST:
-            continue
-        later_s = camera.rolling_shutter_s * (pixels[inside, 1] / (camera.height_px - 1.0) - 0.5)
-        speed = -moving[index] - np.cross(turning[index], seen[inside])
-        bent = np.einsum("nij,nj->ni", by_point[inside], speed * later_s[:, None])
-        by_turn = by_point[inside] @ (-rotation[index] @ skews(points[inside]))
-        by_pose = np.concatenate((by_point[inside], by_turn), axis=2).reshape(-1, 6)
-        error = np.linalg.lstsq(by_pose, bent.ravel(), rcond=None)[0]
-        position[index] -= error[:3]
-        rotation[index] = rotation[index] @ Rotation.from_rotvec(-error[3:]).as_matrix()
+    for bundle in bundles:
+        if bundle.marker_id in sightings.ids:
+            its = np.flatnonzero(sightings.bundle == sightings.ids.index(bundle.marker_id))
+            corners = np.concatenate([marker.corners for marker in bundle.markers])
+            found = position[its], rotation[its]
+            position[its], rotation[its] = _straight(found, corners, turning[its], moving[its], camera)
     return replace(sightings, position=position, rotation=rotation)
+
+
+def _straight(
+    found: tuple[Array, Array], points: Array, turning: Array, moving: Array, camera: Camera
+) -> tuple[Array, Array]:
+    """Positions (n, 3) and rotations whose corners, bent by the motion, are fitted best by the poses that were found.
+
+    The normal equations of `fit_pose` at those poses, with its weights, hold for the bent corners; solved by Newton's
+    method. Where too few corners are in the picture the pose stays.
+    """
+    position, rotation = found
+    fitted, by_point = _project(camera, points @ rotation.transpose(0, 2, 1) + position[:, None])
+    inside = (fitted >= 0.0).all(axis=2) & (fitted <= (camera.width_px - 1.0, camera.height_px - 1.0)).all(axis=2)
+    usable = inside.sum(axis=1) >= _FEWEST
+    at_found = _by_pose(np.nan_to_num(by_point), rotation, points)
+    later_s = camera.rolling_shutter_s * (np.nan_to_num(fitted[..., 1:]) / (camera.height_px - 1.0) - 0.5)
+    for _ in range(_STEPS):
+        straight = points @ rotation.transpose(0, 2, 1) + position[:, None]
+        bent = straight - later_s * (moving[:, None] + np.cross(turning[:, None], straight))
+        pixels, by_point = _project(camera, bent)
+        away = fitted - pixels
+        good = np.asarray(inside & np.isfinite(away).all(axis=2))
+        away = np.where(good[..., None], away, 0.0)
+        weights = good * huber_weights(np.linalg.norm(away, axis=2) / camera.pixel_sigma)
+        normal = (at_found * np.repeat(weights, 2, axis=1)[..., None]).transpose(0, 2, 1)
+        slope = normal @ _by_pose(np.nan_to_num(by_point), rotation, points)
+        slope[~usable] = np.eye(6)
+        step = np.linalg.solve(slope, normal @ away.reshape(len(away), -1, 1))[..., 0] * usable[:, None]
+        position, rotation = position + step[:, :3], rotation @ rotations(step[:, 3:])
+        if np.abs(step).max() < _SETTLED:
+            break
+    return position, rotation
+
+
+def _project(camera: Camera, points: Array) -> tuple[Array, Array]:
+    """Pixels (n, k, 2) of points (n, k, 3) in camera axes and their derivatives (n, k, 2, 3)."""
+    pixels, by_point = camera.project_with_jacobian(points.reshape(-1, 3))
+    return pixels.reshape(*points.shape[:2], 2), by_point.reshape(*points.shape[:2], 2, 3)
+
+
+def _by_pose(by_point: Array, rotation: Array, points: Array) -> Array:
+    """Derivative (n, 2k, 6) of pixels by the poses' errors."""
+    by_turn = by_point @ (-rotation[:, None] @ skews(points))
+    rows = np.concatenate((by_point, by_turn), axis=3)
+    return np.asarray(rows, dtype=float).reshape(len(rotation), -1, 6)
 
 
 def _twist(place: Place, unknowns: Unknowns) -> tuple[Array, Array]:
