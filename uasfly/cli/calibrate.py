@@ -1,4 +1,4 @@
-"""`uasfly calibrate`: a camera's lens from pictures of a board; the board for printing."""
+"""`uasfly calibrate`: a camera's lens from pictures of a board; the board for printing; the mounting from a log."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 from typer.core import TyperGroup
+
+from uasfly.cli.calibrate_mounting import mounting
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -36,13 +38,14 @@ class _LensByDefault(TyperGroup):
 calibrate = typer.Typer(
     cls=_LensByDefault,
     no_args_is_help=True,
-    help="Calibrate a camera: its lens from pictures of a board (calibrate SOURCE...).",
+    help="Calibrate a camera: its lens from pictures of a board (calibrate SOURCE...), its mounting from a log.",
 )
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
     calibrate.command(name="lens")(lens)
+    calibrate.command(name="mounting")(mounting)
     calibrate.command(name="print")(print_board)
     app.add_typer(calibrate, name="calibrate")
 

@@ -74,6 +74,17 @@ class ReproduceProgress(_Bar):
         self._progress.update(self._task, completed=done, description=f"{self._paper}: {escape(text)}")
 
 
+class RecordingProgress(_Bar):
+    """Shows how much of a recording is done, and what it holds."""
+
+    def __init__(self) -> None:
+        super().__init__("recording")
+
+    def update(self, text: str, done: float) -> None:
+        """Tell what there is so far, and the share of the time that is over."""
+        self._progress.update(self._task, completed=done, description=escape(text))
+
+
 class PictureProgress(_Bar):
     """Shows how many pictures have been looked at; how many there are is not known beforehand."""
 

@@ -34,13 +34,22 @@ def covariance_in_body(camera: Camera, pose: Pose, covariance: Array) -> Array:
         pose: of the marker in camera axes.
         covariance: (6, 6) position [m^2, camera axes], rotation [rad^2, marker axes].
     """
-    C, R = camera.transform_camera_to_body.rotation, pose.rotation
-    axes = np.eye(6)
-    axes[:3, :3] = C
-    by_turn = np.vstack((-C @ skew(pose.position), R.T))
-    result: Array = axes @ covariance @ axes.T + math.radians(camera.mounting_sigma_deg) ** 2 * by_turn @ by_turn.T
-    result[:3, :3] += camera.mounting_sigma_m**2 * np.eye(3)
+    axes = _axes(camera)
+    result: Array = axes @ covariance @ axes.T + _mounting_part(camera, pose)
     return 0.5 * (result + result.T)
+
+
+def seen_by_camera(camera: Camera, sample: MarkerSample) -> tuple[Pose, Array]:
+    """The pose in camera axes and its covariance (6, 6) that `marker_sample` was given: its inverse.
+
+    Args:
+        camera: the mounting that the sample was made with.
+        sample: what the filter took in.
+    """
+    pose = pose_in_camera(camera, sample.position_in_body, sample.quaternion_marker_to_body)
+    axes = _axes(camera)
+    covariance: Array = axes.T @ (sample.covariance - _mounting_part(camera, pose)) @ axes
+    return pose, 0.5 * (covariance + covariance.T)
 
 
 def marker_sample(camera: Camera, marker_id: int, time_s: float, pose: Pose, covariance: Array) -> MarkerSample:
@@ -61,3 +70,18 @@ def marker_sample(camera: Camera, marker_id: int, time_s: float, pose: Pose, cov
         quaternion_marker_to_body=in_body.quaternion,
         covariance=covariance_in_body(camera, pose, covariance),
     )
+
+
+def _axes(camera: Camera) -> Array:
+    """(6, 6) that turns the position of a pose's error into the body."""
+    axes = np.eye(6)
+    axes[:3, :3] = camera.transform_camera_to_body.rotation
+    return axes
+
+
+def _mounting_part(camera: Camera, pose: Pose) -> Array:
+    """Covariance (6, 6) that the mounting's uncertainty adds, see `covariance_in_body`."""
+    by_turn = np.vstack((-camera.transform_camera_to_body.rotation @ skew(pose.position), pose.rotation.T))
+    result: Array = math.radians(camera.mounting_sigma_deg) ** 2 * by_turn @ by_turn.T
+    result[:3, :3] += camera.mounting_sigma_m**2 * np.eye(3)
+    return result

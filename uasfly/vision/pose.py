@@ -164,6 +164,11 @@ def _lengths(residuals: Array, sigma_px: Array) -> Array:
     return np.asarray(np.linalg.norm(residuals, axis=1) / sigma_px, dtype=float)
 
 
+def huber_weights(lengths: Array) -> Array:
+    """Weights (n,) that the fit gives to points whose residuals have these lengths, in sigmas."""
+    return np.asarray(np.minimum(1.0, _HUBER / np.maximum(lengths, 1e-12)), dtype=float)
+
+
 def _cost(residuals: Array, sigma_px: Array) -> float:
     """Huber's loss of the residuals' lengths; NaN where a point is behind the camera."""
     length = _lengths(residuals, sigma_px)
@@ -172,7 +177,7 @@ def _cost(residuals: Array, sigma_px: Array) -> float:
 
 def _normal_equations(residuals: Array, jacobian: Array, sigma_px: Array) -> tuple[Array, Array]:
     length = _lengths(residuals, sigma_px)
-    weight = np.minimum(1.0, _HUBER / np.maximum(length, 1e-12)) / sigma_px**2
+    weight = huber_weights(length) / sigma_px**2
     weighted = jacobian * weight[:, None, None]
     normal: Array = np.einsum("nki,nkj->ij", weighted, jacobian)
     gradient: Array = np.einsum("nki,nk->i", weighted, residuals)

@@ -49,6 +49,14 @@ def camera_text(path: Path | None) -> str:
     return path.read_text(encoding="utf-8-sig")
 
 
+def text_of(camera: Camera) -> str:
+    """Text of a camera file with what a camera in memory says."""
+    fields = camera.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+    placement = fields.pop("transform_camera_to_body")
+    flat = {f"transform_camera_to_body.{name}": value for name, value in placement.items()}
+    return with_fields(f"name: {fields.pop('name')}\n", {**fields, **flat}, "lens", [])
+
+
 def with_fields(text: str, fields: Mapping[str, object], kind: str, comments: list[str]) -> str:
     """The text with other values and other comments of this kind of calibration at its beginning.
 
