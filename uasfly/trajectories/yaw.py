@@ -79,7 +79,7 @@ def along(
     if isinstance(rule, FixedYaw):
         return constant(nearest_turn(rule.yaw_rad, before_rad), table.duration_s)
     times = _knot_times(table.duration_s)
-    position, velocity, _ = table.sample_long(times)
+    position, velocity, _ = table.sample(times)
     way = velocity[:, :2] if isinstance(rule, PathYaw) else np.array(rule.point_m) - position[:, :2]
     yaw = np.where(np.hypot(way[:, 0], way[:, 1]) > UNDEFINED_M, np.arctan2(way[:, 1], way[:, 0]), np.nan)
     defined = np.flatnonzero(~np.isnan(yaw))
