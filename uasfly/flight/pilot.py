@@ -6,7 +6,6 @@ The same step serves the live flight, the rehearsal and the replay of a log: sam
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,6 +34,7 @@ from uasfly.messages import (
     Setpoint,
     StateEstimate,
     Status,
+    message,
 )
 from uasfly.mission import Mission
 from uasfly.observer.diagnosis import Diagnosis
@@ -44,7 +44,7 @@ from uasfly.preflight_messages import PreflightCheck
 _ENDINGS = {Action.END: None, Action.RETURN: EndingAction.RETURN, Action.LAND: EndingAction.LAND}
 
 
-@dataclass(frozen=True, slots=True)
+@message
 class StepResult:
     """What a step wants: a setpoint to send (None: send nothing), requests to the vehicle, and what it has to say.
 
