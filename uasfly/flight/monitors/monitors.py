@@ -56,5 +56,12 @@ class Monitors:
 
     def check(self, watched: Watched) -> tuple[Alarm, ...]:
         """What is an alarm now, the mission's order of monitors."""
-        alarms = [watch.check(watched) for watch in self._watches]
-        return tuple(alarm for alarm in alarms if alarm is not None)
+        alarms: list[Alarm] = []
+        flying = watched.flying
+        for watch in self._watches:
+            text = watch.find(watched) if flying or not watch.flying_only else ""
+            if text or watch.lasts:  # hardly ever
+                alarm = watch.update(watched.time_s, text)
+                if alarm is not None:
+                    alarms.append(alarm)
+        return tuple(alarms)

@@ -22,7 +22,7 @@ class Fallbacks:
     def late(self, watched: Watched) -> str:
         """Looks at the step too: call this one first in each cycle."""
         self._add(watched)
-        share = self._share("plan", "backup")
+        share = self._share(self._counts["plan"] + self._counts["backup"])
         if share > self._settings.late_share:
             return f"the solver is late or fails in {share * 100.0:.0f} % of the steps"
         return ""
@@ -30,7 +30,7 @@ class Fallbacks:
     def backup(self, watched: Watched) -> str:
         """Whether the backup flies too much."""
         del watched
-        share = self._share("backup")
+        share = self._share(self._counts["backup"])
         if share > self._settings.backup_share:
             return f"the solver fails: the backup flies {share * 100.0:.0f} % of the time"
         return ""
@@ -40,9 +40,10 @@ class Fallbacks:
             fallback = watched.control.fallback
             self._steps.append((watched.time_s, fallback))
             self._counts[fallback] += 1
-        while self._steps and self._steps[0][0] < watched.time_s - self._settings.window_s:
+        begin_s = watched.time_s - self._settings.window_s
+        while self._steps and self._steps[0][0] < begin_s:
             self._counts[self._steps.popleft()[1]] -= 1
 
-    def _share(self, *kinds: str) -> float:
+    def _share(self, steps: int) -> float:
         count = len(self._steps)
-        return sum(self._counts[kind] for kind in kinds) / count if count >= FEWEST_STEPS else 0.0
+        return steps / count if count >= FEWEST_STEPS else 0.0
