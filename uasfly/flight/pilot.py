@@ -14,7 +14,7 @@ from uasfly.control.authority import AuthorityMeter
 from uasfly.control.controller import Controller, ControlResult
 from uasfly.flight.choices import EndingAction, Engage
 from uasfly.flight.clearance import Clearance
-from uasfly.flight.course import Course
+from uasfly.flight.course import NOT_BEGUN, Course
 from uasfly.flight.echo import echo, told
 from uasfly.flight.marker_guide import MarkerGuide
 from uasfly.flight.monitors import Monitors, Watched
@@ -333,15 +333,12 @@ class Pilot:
     ) -> Status:
         sequencer, course, view = self.sequencer, self.course, self.view
         in_legs = sequencer.phase is Phase.LEGS
-        leg = course.leg(time_s) if in_legs else -1
+        progress = course.progress(time_s) if in_legs or sequencer.phase is Phase.ENGAGE else NOT_BEGUN
+        leg = progress.leg if in_legs else -1
         self._leg_started |= leg >= 0
-        reference, progress = None, 0.0
-        if course.begun and sequencer.phase in (Phase.LEGS, Phase.ENGAGE):
-            progress = course.progress(time_s)
+        reference = None
         if in_legs and (course.begun or self._guide is not None):
             reference = course.place_at(time_s) if self._reference is None else self._reference
-        elif sequencer.phase in (Phase.ENDING, Phase.DONE):
-            progress = 1.0
         announcements = tuple(sequencer.announcements)
         sequencer.announcements.clear()
         battery = view.battery
@@ -350,7 +347,7 @@ class Pilot:
             phase=sequencer.phase,
             leg=leg,
             leg_started=self._leg_started and in_legs,
-            progress=progress,
+            progress=1.0 if sequencer.phase in (Phase.ENDING, Phase.DONE) else progress.share,
             estimate=estimate,
             reference_position_in_world=reference,
             fallback=self._control.fallback if self._control is not None else "",
@@ -364,7 +361,7 @@ class Pilot:
             authority=authority,
             alarms=alarms,
             action=self._response.action,
-            pace=course.pace(time_s) if in_legs else 0.0,
+            pace=progress.pace if in_legs else 0.0,
             pilot_flies=sequencer.pilot_flies,
             marker_age_s=math.nan if self._guide is None else self._guide.age_s,
             waits_for="the marker" if in_legs and self._guide is not None and not course.begun else "",
