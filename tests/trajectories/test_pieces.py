@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from uasfly.trajectories.pieces import CHUNK, Pieces, PieceTable, concatenate, rest, straight_pieces
+from uasfly.trajectories.pieces import Pieces, PieceTable, concatenate, rest, straight_pieces
 from uasfly.trajectories.placement import Placement
+from uasfly.trajectories.segments import CHUNK
 
 
 def random_pieces(seed: int, count: int = 6) -> Pieces:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uasfly.messages import Array
-from uasfly.trajectories.piece_motion import HARMONICS
-from uasfly.trajectories.pieces import CUBIC, PHASE, Pieces
+from uasfly.trajectories.pieces import CUBIC, HARMONICS, PHASE, Pieces
 from uasfly.trajectories.polyline import move
 from uasfly.trajectories.profile import MotionLimits
 

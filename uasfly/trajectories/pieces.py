@@ -10,19 +10,21 @@ acceleration are the exact derivatives. With one table for a whole mission a hor
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
+import casadi as ca
 import numpy as np
 
 from uasfly.messages import Array
-from uasfly.trajectories.piece_motion import COLUMNS, HARMONICS, MotionSampler
 from uasfly.trajectories.placement import Placement
+from uasfly.trajectories.segments import Segments, segment_function
 
 CUBIC = slice(0, 3)  # columns of a polynomial: x, y, z [m]
 PHASE = 3  # [rad]
-CHUNK = 256  # times sampled at once
+COLUMNS = 4
+HARMONICS = 4  # cos, sin, cos of twice, sin of twice the phase
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,23 @@ def concatenate(parts: Sequence[Pieces]) -> Pieces:
     )
 
 
+@lru_cache(maxsize=1)
+def _piece_function() -> ca.Function:
+    """Position [m], velocity [m/s] and acceleration [m/s^2] from polynomials (4, 4) and harmonics (4, 3) in one row."""
+
+    def motion(t: ca.SX, row: ca.SX) -> list[ca.SX]:
+        polynomials = ca.reshape(row[: 4 * COLUMNS], COLUMNS, 4)
+        vectors = ca.reshape(row[4 * COLUMNS :], 3, HARMONICS)
+        x, y, z, phase = ca.vertsplit(ca.mtimes(polynomials, ca.vertcat(1.0, t, t**2, t**3)))
+        cosine, sine = ca.cos(phase), ca.sin(phase)
+        harmonics = ca.vertcat(cosine, sine, cosine * cosine - sine * sine, 2.0 * cosine * sine)
+        position = ca.vertcat(x, y, z) + ca.mtimes(vectors, harmonics)
+        velocity = ca.jacobian(position, t)
+        return [position, velocity, ca.jacobian(velocity, t)]
+
+    return segment_function("uasfly_piece", 4 * COLUMNS + 3 * HARMONICS, motion)
+
+
 class PieceTable:
     """Samples pieces at many times at once; one table is for one thread.
 
@@ -83,44 +102,22 @@ class PieceTable:
     """
 
     def __init__(self, pieces: Pieces, placement: Placement | None = None) -> None:
-        ends = np.cumsum(pieces.durations_s)
-        self.duration_s = float(ends[-1]) if ends.size else 0.0
-        self._starts = np.concatenate(([0.0], ends[:-1]))
-        self._start_list: list[float] = self._starts.tolist()
         polynomials, harmonics = pieces.polynomials.copy(), pieces.harmonics
         if placement is not None:
             polynomials[:, :, CUBIC] = placement.turned(polynomials[:, :, CUBIC])
             polynomials[:, 0, CUBIC] += placement.origin
             harmonics = placement.turned(harmonics)
         count = len(polynomials)
-        self._pieces = np.hstack((polynomials.reshape(count, -1), harmonics.reshape(count, -1)))
-        self._samplers: dict[int, MotionSampler] = {}  # by the number of times
-        self._one = MotionSampler(1)
+        rows = np.hstack((polynomials.reshape(count, -1), harmonics.reshape(count, -1)))
+        self._segments = Segments(_piece_function(), pieces.durations_s, rows)
+        self.duration_s = self._segments.duration_s
 
     def sample(self, times_s: Array) -> tuple[Array, Array, Array]:
         """Position [m], velocity [m/s] and acceleration [m/s^2], each (n, 3), at (n,) times [s], which are clamped."""
-        if times_s.size > CHUNK:
-            chunks = [self.sample(times_s[first : first + CHUNK]) for first in range(0, times_s.size, CHUNK)]
-            position, velocity, acceleration = (np.concatenate(arrays) for arrays in zip(*chunks, strict=True))
-            return position, velocity, acceleration
-        sampler = self._samplers.get(times_s.size)
-        if sampler is None:
-            if not times_s.size:
-                return np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3))
-            sampler = self._samplers[times_s.size] = MotionSampler(times_s.size)
-        times = np.minimum(np.maximum(times_s, 0.0), self.duration_s)
-        index = self._starts.searchsorted(times, "right") - 1
-        np.subtract(times, self._starts.take(index), out=sampler.times_s)
-        self._pieces.take(index, axis=0, out=sampler.pieces, mode="clip")  # no index is clipped: this mode is direct
-        sampler.evaluate()
-        return sampler.position.copy(), sampler.velocity.copy(), sampler.acceleration.copy()
+        position, velocity, acceleration = self._segments.sample(times_s)
+        return position, velocity, acceleration
 
     def position_at(self, time_s: float) -> tuple[float, float, float]:
-        """Position [m] at one time [s], clamped, without arrays."""
-        time_s = min(max(time_s, 0.0), self.duration_s)
-        piece = bisect_right(self._start_list, time_s) - 1
-        sampler = self._one
-        sampler.times_s[0], sampler.pieces[0] = time_s - self._start_list[piece], self._pieces[piece]
-        sampler.evaluate()
-        x, y, z = sampler.position[0].tolist()
+        """Position [m] at one time [s], clamped."""
+        x, y, z = self._segments.sample_one(time_s)[0].tolist()
         return x, y, z
