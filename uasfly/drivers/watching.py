@@ -7,7 +7,8 @@ import threading
 from collections.abc import Callable
 
 from uasfly.errors import describe_error
-from uasfly.messages import Status, message
+from uasfly.flight.tracking_errors import MarkerDatum
+from uasfly.messages import Sample, Status, message
 
 BACKLOG = 200  # steps that wait for a terminal; beyond them only those that announce something are kept
 CLOSE_TIMEOUT_S = 1.0
@@ -29,6 +30,8 @@ class Cycle:
 
 
 Watch = Callable[[Status, Cycle], None]
+# A step's status, the samples that it took in with the truth among them, and where the marker is (see `TrueMarkers`).
+Witness = Callable[[Status, tuple[Sample, ...], MarkerDatum | None], None]
 
 
 class BackgroundWatch:
