@@ -17,9 +17,9 @@ def test_a_slot_keeps_the_newest_and_counts_the_rest() -> None:
     slot = Slot("ODOMETRY", 3)
     for index in range(5):
         slot.put(float(index), str(index))
-    assert slot
+    assert slot.waiting
     assert slot.take() == [(2.0, "2"), (3.0, "3"), (4.0, "4")]
-    assert not slot
+    assert not slot.waiting
     assert slot.take() == []
     assert (slot.received, slot.overrun) == (5, 2)
 

@@ -67,7 +67,8 @@ class AuthorityMeter:
     """
 
     def __init__(self, limits: Limits, model: ModelParameters, home_speed_m_s: float) -> None:
-        self._limits = limits
+        self._tilt_tangent = math.tan(limits.tilt_rad)
+        self._thrust_min, self._thrust_max = limits.thrust_min, limits.thrust_max
         self._drag_1_s = max(model.drag_1_s[:2])
         self._home_speed_m_s = home_speed_m_s
         self._fast = self._slow = (0.0, 0.0, 0.0)
@@ -101,15 +102,14 @@ class AuthorityMeter:
     def _shares(self, force: Force, k_thrust_m_s2: float) -> tuple[float, float]:
         """Shares of the tilt and of the thrust that balancing a force takes."""
         east, north, up = force
-        limits = self._limits
         lift = max(GRAVITY_M_S2 - up, 1e-3)  # what the rotors have to carry
         sideways = math.hypot(east, north)
-        horizontal = sideways / (lift * math.tan(limits.tilt_rad))
+        horizontal = sideways / (lift * self._tilt_tangent)
         hover = GRAVITY_M_S2 / k_thrust_m_s2
         thrust = math.hypot(lift, sideways) / k_thrust_m_s2
-        more = (thrust - hover) / max(limits.thrust_max - hover, 1e-3)
-        less = (hover - thrust) / max(hover - limits.thrust_min, 1e-3)
-        return horizontal, max(more, less)
+        if thrust > hover:
+            return horizontal, (thrust - hover) / max(self._thrust_max - hover, 1e-3)
+        return horizontal, (hover - thrust) / max(hover - self._thrust_min, 1e-3)
 
     def _homeward(self, k_thrust_m_s2: float, way_home: Array) -> float:
         x, y, _ = way_home.tolist()

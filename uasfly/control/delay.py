@@ -20,6 +20,8 @@ from uasfly.model import INPUTS, PARAMETER_K_THRUST, PARAMETERS, PITCH, ROLL, ST
 LONGEST_PREDICTION_S = 0.5
 KEPT = 256  # setpoints
 
+Command = tuple[float, float, float]  # inputs of the controller's model: thrust, roll and pitch command
+
 
 @lru_cache(maxsize=1)
 def _compiled_interval() -> ca.Function:
@@ -44,17 +46,21 @@ class DelayPredictor:
             [self._states[:-1], self._inputs, self._parameters, self._yaws, self._yaw_rate, self._durations],
             [self._states[1:]],
         )
-        # From when each setpoint acts [s]; the first one acts since ever, None where it is not known.
-        self._history: deque[tuple[float, Setpoint | None]] = deque(((-math.inf, None),), maxlen=KEPT)
+        # Commands and from when each acts [s]; the first one acts since ever, None where it is not known.
+        self._commands: deque[Command | None] = deque((None,), maxlen=KEPT)
+        self._acts_s: deque[float] = deque((-math.inf,), maxlen=KEPT)
 
     def reset(self, setpoint: Setpoint | None) -> None:
         """Forget what was sent; `setpoint` is what the vehicle was being told so far, if that is known."""
-        self._history.clear()
-        self._history.append((-math.inf, setpoint))
+        self._commands.clear()
+        self._acts_s.clear()
+        self._commands.append(None if setpoint is None else inputs_of(setpoint))
+        self._acts_s.append(-math.inf)
 
     def sent(self, setpoint: Setpoint) -> None:
         """Remember a setpoint, sent at its `time_s`."""
-        self._history.append((setpoint.time_s + self._model.command_delay_s, setpoint))
+        self._commands.append(inputs_of(setpoint))
+        self._acts_s.append(setpoint.time_s + self._model.command_delay_s)
 
     def predict(
         self, state: Array, yaw_rad: float, yaw_rate_rad_s: float, parameters: Array, from_s: float, to_s: float
@@ -70,18 +76,19 @@ class DelayPredictor:
             to_s: when the next command acts; at most 0.5 s are predicted.
         """
         to_s = min(to_s, from_s + LONGEST_PREDICTION_S)
-        history = self._history
-        while len(history) > 1 and history[1][0] <= from_s:
-            history.popleft()
-        at, ends = from_s, itertools.chain((start_s for start_s, _ in itertools.islice(history, 1, None)), (to_s,))
-        inputs: list[tuple[float, float, float]] = []
+        commands, acts_s = self._commands, self._acts_s
+        while len(acts_s) > 1 and acts_s[1] <= from_s:
+            commands.popleft()
+            acts_s.popleft()
+        at, ends_s = from_s, itertools.chain(itertools.islice(acts_s, 1, None), (to_s,))
+        inputs: list[Command] = []
         yaws: list[float] = []
         durations: list[float] = []
-        for (_, setpoint), next_s in zip(history, ends, strict=True):
-            end = min(next_s, to_s)
+        for command, end_s in zip(commands, ends_s, strict=True):
+            end = end_s if end_s < to_s else to_s
             if end <= at:
                 continue
-            inputs.append(self._unknown_inputs(state, parameters) if setpoint is None else inputs_of(setpoint))
+            inputs.append(self._unknown_inputs(state, parameters) if command is None else command)
             yaws.append(yaw_rad + yaw_rate_rad_s * (at - from_s))
             durations.append(end - at)
             at = end
@@ -93,7 +100,7 @@ class DelayPredictor:
                 step()
         return self._states[count].copy(), yaw_rad + yaw_rate_rad_s * max(to_s - from_s, 0.0)
 
-    def _unknown_inputs(self, state: Array, parameters: Array) -> tuple[float, float, float]:
+    def _unknown_inputs(self, state: Array, parameters: Array) -> Command:
         """Thrust, roll and pitch command (3,) that keep attitude and height: the guess where nothing is known."""
         model, roll, pitch = self._model, float(state[ROLL]), float(state[PITCH])
         level = max(math.cos(roll) * math.cos(pitch), 0.5)
@@ -101,7 +108,7 @@ class DelayPredictor:
         return min(hover / level, 1.0), roll / model.roll.gain, pitch / model.pitch.gain
 
 
-def inputs_of(setpoint: Setpoint) -> tuple[float, float, float]:
+def inputs_of(setpoint: Setpoint) -> Command:
     """Inputs (3,) of the controller's model: thrust, roll and pitch command."""
     return setpoint.thrust, setpoint.roll_rad, setpoint.pitch_rad
 

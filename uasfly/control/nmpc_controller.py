@@ -11,7 +11,7 @@ from uasfly.control.authority import holdable_force, nearby
 from uasfly.control.backup import PositionPid
 from uasfly.control.delay import LONGEST_PREDICTION_S, DelayPredictor, inputs_of, state_of
 from uasfly.control.iteration import RealTimeIteration
-from uasfly.control.parts import Attitude, SetpointGuard, all_finite
+from uasfly.control.parts import Attitude, SetpointGuard
 from uasfly.control.problem import problem_from_airframe
 from uasfly.control.protocol import ControlResult, ReferenceAt, Timer
 from uasfly.control.qp import SolveStatus
@@ -129,21 +129,18 @@ class NmpcController:
         self, estimate: StateEstimate, attitude: Attitude, reference: ReferenceHorizon, k_thrust: float, acts_s: float
     ) -> tuple[SolveStatus, float]:
         """Fill the solver's data and solve; status and the seconds it took."""
-        force, work = estimate.force_in_world, self.solver.workspace
-        angles = attitude.roll_rad + attitude.yaw_rad + attitude.yaw_rate_rad_s
-        if not (
-            all_finite(estimate.position_in_world, estimate.velocity_in_world, force)
-            and math.isfinite(angles + float(reference.yaw_rad[0]))
-        ):
+        force, work, reference_yaw = estimate.force_in_world, self.solver.workspace, float(reference.yaw_rad[0])
+        state = state_of(estimate.position_in_world, estimate.velocity_in_world, attitude.roll_rad, attitude.pitch_rad)
+        yaws = attitude.yaw_rad + attitude.yaw_rate_rad_s + reference_yaw
+        if not math.isfinite(sum(state.tolist()) + sum(force.tolist()) + yaws):
             return SolveStatus.BAD_INPUT, 0.0
         self._force = force
         force = holdable_force(force, self._airframe.limits, k_thrust)
         parameters = controller_parameters(self._airframe.model, force, k_thrust)
-        state = state_of(estimate.position_in_world, estimate.velocity_in_world, attitude.roll_rad, attitude.pitch_rad)
         work.initial[:], yaw_rad = self._delay.predict(
             state, attitude.yaw_rad, attitude.yaw_rate_rad_s, parameters, estimate.time_s, acts_s
         )
-        error = wrap_angle(float(reference.yaw_rad[0]) - yaw_rad)
+        error = wrap_angle(reference_yaw - yaw_rad)
         np.subtract(reference.yaw_rad, self._yaw.remaining_error(error, self._times), out=work.yaw)
         work.parameters[:], work.force[:] = parameters, force
         work.position[:] = nearby(reference.position_in_world, work.initial[:3])

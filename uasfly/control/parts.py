@@ -22,7 +22,7 @@ class Attitude:
     @classmethod
     def of(cls, estimate: StateEstimate) -> Attitude:
         """From quaternion and body rates; not finite where those are not."""
-        if not all_finite(estimate.quaternion_body_to_world):
+        if not math.isfinite(sum(estimate.quaternion_body_to_world.tolist())):
             return cls(math.nan, math.nan, math.nan, math.nan)
         roll, pitch, yaw = euler_from_quaternion(estimate.quaternion_body_to_world)
         _, rate_y, rate_z = estimate.angular_rate_in_body.tolist()

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
-from uasfly.messages import Array, ReferenceHorizon, Setpoint, StateEstimate
+from uasfly.messages import Array, ReferenceHorizon, Setpoint, StateEstimate, message
 
 ReferenceAt = Callable[[Array], ReferenceHorizon]  # reference at absolute times (n,) [s], on the clock of the estimates
 Timer = Callable[[], float]  # seconds; time.perf_counter where a driver measures
 
 
-@dataclass(frozen=True, slots=True)
+@message
 class ControlResult:
     """One step's outcome.
 

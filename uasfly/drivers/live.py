@@ -194,9 +194,8 @@ class _LiveFlight:
 
     def _record(self, result: StepResult, samples: tuple[Sample, ...]) -> None:
         if self._writer is not None:
-            for message in (*samples, *result.requests, result.setpoint, *result.preflight, result.status):
-                if message is not None:
-                    self._writer.write(message, result.status.time_s)
+            messages = (*samples, *result.requests, result.setpoint, *result.preflight, result.status)
+            self._writer.write_all(messages, result.status.time_s)
 
     def _break_off(self, reason: str) -> None:
         """End a flight whose cycle has failed; its step gives no status any more, so this one stands for it."""

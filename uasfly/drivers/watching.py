@@ -5,17 +5,16 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from uasfly.errors import describe_error
 from uasfly.flight.tracking_errors import MarkerDatum
-from uasfly.messages import Sample, Status
+from uasfly.messages import Sample, Status, message
 
 BACKLOG = 200  # steps that wait for a terminal; beyond them only those that announce something are kept
 CLOSE_TIMEOUT_S = 1.0
 
 
-@dataclass(frozen=True, slots=True)
+@message
 class Cycle:
     """What only the driver knows of a cycle.
 

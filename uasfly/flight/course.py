@@ -8,7 +8,7 @@ import numpy as np
 
 from uasfly.airframe import Limits
 from uasfly.frames import euler_from_quaternion, wrap_angle
-from uasfly.messages import Action, Array, ReferenceHorizon, StateEstimate
+from uasfly.messages import Action, Array, ReferenceHorizon, StateEstimate, message
 from uasfly.mission import Mission
 from uasfly.trajectories.crossfade import Crossfade
 from uasfly.trajectories.feasibility import check_placed
@@ -25,6 +25,24 @@ HOLD_YAW_RAD = math.radians(10.0)  # and beyond this turn
 PLAN_AFTER_S = 0.2  # held for so long, the mission is planned from there
 TOO_FAR_M = 100.0  # from where the mission was left: nobody meant to take it up here
 FADE_AHEAD_S = np.linspace(0.0, 5.0, 6)  # where the distance to a frame that lies elsewhere is looked at
+
+
+@message
+class Progress:
+    """How far a mission has come.
+
+    Attributes:
+        leg: index of the one that the reference flies, -1 in transitions and outside.
+        share: 0..1 of the mission's duration.
+        pace: rate of the mission's time.
+    """
+
+    leg: int
+    share: float
+    pace: float
+
+
+NOT_BEGUN = Progress(-1, 0.0, 0.0)
 
 
 class Course:
@@ -183,9 +201,11 @@ class Course:
                 pace = -slow_pace if self._way_back_left(time_s, back_off_m) else 0.0
             case _:
                 pace = 1.0
-        arriving = self._glide is not None and time_s < self._glide.start_s + self._glide.duration_s
-        if arriving and self._pacing.target == 0.0 and pace > 0.0:
-            return  # on the way back to where the mission was left
+        if self._glide is not None:
+            if time_s >= self._glide.start_s + self._glide.duration_s:
+                self._glide = None  # it has faded out
+            elif self._pacing.target == 0.0 and pace > 0.0:
+                return  # on the way back to where the mission was left
         self._pacing.change(time_s, pace)
 
     def at(self, times_s: Array) -> ReferenceHorizon:
@@ -213,26 +233,18 @@ class Course:
             return np.array(place)
         return np.array([p + offset for p, offset in zip(place, self._glide.offset_at(time_s), strict=True)])
 
-    def pace(self, time_s: float) -> float:
-        """Rate of the mission's time."""
-        return self._pacing.pace(time_s) if self._trajectory is not None else 0.0
-
     def done(self, time_s: float) -> bool:
         """Whether the reference has come to its end."""
         return self._trajectory is not None and self._mission_s(time_s) >= self._trajectory.duration_s
 
-    def progress(self, time_s: float) -> float:
-        """0..1 of the mission's duration."""
-        if self._trajectory is None:
-            return 0.0
-        return min(1.0, max(0.0, self._mission_s(time_s) / self._trajectory.duration_s))
-
-    def leg(self, time_s: float) -> int:
-        """Index of the leg that the reference flies, -1 in transitions and outside."""
-        if self._trajectory is None:
-            return -1
-        mission_s = self._mission_s(time_s)
-        return self._trajectory.leg_at(mission_s) if self._trajectory.in_leg(mission_s) else -1
+    def progress(self, time_s: float) -> Progress:
+        """How far the mission has come."""
+        trajectory = self._trajectory
+        if trajectory is None:
+            return NOT_BEGUN
+        mission_s, pace = self._pacing.at(time_s)
+        leg = trajectory.leg_at(mission_s) if trajectory.in_leg(mission_s) else -1
+        return Progress(leg, min(1.0, max(0.0, mission_s / trajectory.duration_s)), pace)
 
     def _mission_s(self, time_s: float) -> float:
         return self._pacing.mission_time_s(time_s)

@@ -6,7 +6,6 @@ The same step serves the live flight, the rehearsal and the replay of a log: sam
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from uasfly.control.authority import AuthorityMeter
 from uasfly.control.controller import Controller, ControlResult
 from uasfly.flight.choices import EndingAction, Engage
 from uasfly.flight.clearance import Clearance
-from uasfly.flight.course import Course
+from uasfly.flight.course import NOT_BEGUN, Course
 from uasfly.flight.echo import echo, told
 from uasfly.flight.marker_guide import MarkerGuide
 from uasfly.flight.monitors import Monitors, Watched
@@ -35,6 +34,7 @@ from uasfly.messages import (
     Setpoint,
     StateEstimate,
     Status,
+    message,
 )
 from uasfly.mission import Mission
 from uasfly.observer.diagnosis import Diagnosis
@@ -44,7 +44,7 @@ from uasfly.preflight_messages import PreflightCheck
 _ENDINGS = {Action.END: None, Action.RETURN: EndingAction.RETURN, Action.LAND: EndingAction.LAND}
 
 
-@dataclass(frozen=True, slots=True)
+@message
 class StepResult:
     """What a step wants: a setpoint to send (None: send nothing), requests to the vehicle, and what it has to say.
 
@@ -102,6 +102,7 @@ class Pilot:
         if mission.marker is not None:
             self._guide = MarkerGuide(mission.marker, marker_id, airframe.limits.yaw_rate_rad_s)
         self._meter = AuthorityMeter(airframe.limits, airframe.model, mission.transition.speed_m_s)
+        self._authority: Authority | None = None  # at the monitors' last look
         self._response = Response()
         self._phase = self.sequencer.phase  # as far as this object has followed it
         self._ground: Array | None = None  # where the vehicle last stood
@@ -154,15 +155,14 @@ class Pilot:
             self.announce(4, f"bundle {number} is seen {away_m:.2f} m from where it was: moved; it is taken anew")
         requests = sequencer.step(time_s, self.view, estimate, self.course.done(time_s))
         checks = self._check_before_flight(time_s, samples, estimate)
-        setpoint, control, authority = None, None, None
+        setpoint, control = None, None
         self._reference = None
         alarms: tuple[Alarm, ...] = ()
         if estimate is not None:
             if self._guide is not None:
                 self._guide.look(time_s, self.observer)
             self._follow_phase(time_s, estimate)
-            authority = self._authority(time_s, estimate, k_thrust)
-            alarms = self._watch(time_s, estimate, authority)
+            alarms = self._watch(time_s, estimate, k_thrust)
             self._respond(time_s, estimate, alarms)
         if sequencer.streaming and estimate is not None:
             setpoint = None if sequencer.in_offboard else echo(self.view, time_s, self.airframe.limits)
@@ -176,7 +176,7 @@ class Pilot:
             self.observer.sent(setpoint, in_offboard=sequencer.in_offboard)
         self._streamed = setpoint is not None
         self._control, self._time_s = control, time_s
-        return StepResult(setpoint, requests, self._status(time_s, estimate, authority, alarms), control, checks)
+        return StepResult(setpoint, requests, self._status(time_s, estimate, alarms), control, checks)
 
     def _check_before_flight(
         self, time_s: float, samples: tuple[Sample, ...], estimate: StateEstimate | None
@@ -262,29 +262,31 @@ class Pilot:
         else:
             self.sequencer.end(time_s, reason, _ENDINGS[action])
 
-    def _watch(self, time_s: float, estimate: StateEstimate, authority: Authority) -> tuple[Alarm, ...]:
+    def _watch(self, time_s: float, estimate: StateEstimate, k_thrust: float) -> tuple[Alarm, ...]:
         """Ask the monitors; they look while uasfly flies, and at some things always."""
         origin = self.course.origin
         flying = self._phase is Phase.LEGS and self.sequencer.streaming and origin is not None
-        place = np.zeros(3) if origin is None else origin
         self._reference = self.course.place_at(time_s) if flying else None
         guide = self._guide
-        alarms = self.monitors.check(
-            Watched(
-                time_s=time_s,
-                flying=flying,
-                estimate=estimate,
-                diagnosis=self._diagnosis(time_s),
-                view=self.view,
-                origin=place,
-                home=self._home(place),
-                reference=self._reference,
-                control=self._control,
-                authority=authority,
-                marker=None if guide is None else guide.marker,
-                by_marker=guide is not None and self.course.begun,
+        if self.monitors.due(time_s, self._control):
+            self._authority = self._measure_authority(time_s, estimate, k_thrust)
+            place = np.zeros(3) if origin is None else origin
+            self.monitors.look(
+                Watched(
+                    time_s=time_s,
+                    flying=flying,
+                    estimate=estimate,
+                    diagnosis=self._diagnosis(time_s),
+                    view=self.view,
+                    origin=place,
+                    home=self._home(place),
+                    reference=self._reference,
+                    authority=self._authority,
+                    marker=None if guide is None else guide.marker,
+                    by_marker=guide is not None and self.course.begun,
+                )
             )
-        )
+        alarms = self.monitors.alarms
         if guide is not None:
             guide.judge(self.observer, alarms, self.course.begun)
             self.sequencer.announcements += guide.announcements
@@ -307,7 +309,7 @@ class Pilot:
             return
         self._follow_phase(time_s, estimate)
 
-    def _authority(self, time_s: float, estimate: StateEstimate, k_thrust_m_s2: float) -> Authority:
+    def _measure_authority(self, time_s: float, estimate: StateEstimate, k_thrust_m_s2: float) -> Authority:
         home = self._home(estimate.position_in_world)
         return self._meter.update(time_s, estimate.force_in_world, k_thrust_m_s2, home - estimate.position_in_world)
 
@@ -328,20 +330,15 @@ class Pilot:
         x, y, _ = estimate.position_in_world.tolist()
         return np.array((x, y, 0.0))  # met in the air: PX4's local origin lies on the ground where it booted
 
-    def _status(
-        self, time_s: float, estimate: StateEstimate | None, authority: Authority | None, alarms: tuple[Alarm, ...]
-    ) -> Status:
+    def _status(self, time_s: float, estimate: StateEstimate | None, alarms: tuple[Alarm, ...]) -> Status:
         sequencer, course, view = self.sequencer, self.course, self.view
         in_legs = sequencer.phase is Phase.LEGS
-        leg = course.leg(time_s) if in_legs else -1
+        progress = course.progress(time_s) if in_legs or sequencer.phase is Phase.ENGAGE else NOT_BEGUN
+        leg = progress.leg if in_legs else -1
         self._leg_started |= leg >= 0
-        reference, progress = None, 0.0
-        if course.begun and sequencer.phase in (Phase.LEGS, Phase.ENGAGE):
-            progress = course.progress(time_s)
+        reference = None
         if in_legs and (course.begun or self._guide is not None):
             reference = course.place_at(time_s) if self._reference is None else self._reference
-        elif sequencer.phase in (Phase.ENDING, Phase.DONE):
-            progress = 1.0
         announcements = tuple(sequencer.announcements)
         sequencer.announcements.clear()
         battery = view.battery
@@ -350,7 +347,7 @@ class Pilot:
             phase=sequencer.phase,
             leg=leg,
             leg_started=self._leg_started and in_legs,
-            progress=progress,
+            progress=1.0 if sequencer.phase in (Phase.ENDING, Phase.DONE) else progress.share,
             estimate=estimate,
             reference_position_in_world=reference,
             fallback=self._control.fallback if self._control is not None else "",
@@ -361,10 +358,10 @@ class Pilot:
             battery_remaining=math.nan if battery is None else battery.remaining,
             battery_voltage_v=view.voltage_v or math.nan,
             telemetry_age_s=view.odometry_age_s(time_s),
-            authority=authority,
+            authority=None if estimate is None else self._authority,
             alarms=alarms,
             action=self._response.action,
-            pace=course.pace(time_s) if in_legs else 0.0,
+            pace=progress.pace if in_legs else 0.0,
             pilot_flies=sequencer.pilot_flies,
             marker_age_s=math.nan if self._guide is None else self._guide.age_s,
             waits_for="the marker" if in_legs and self._guide is not None and not course.begun else "",

@@ -39,6 +39,8 @@ class Response:
             alarms: of the monitors.
             acting: whether actions can be done now; otherwise alarms are only told.
         """
+        if not alarms and not self._alarms:  # nearly always
+            return []
         known = {id(alarm) for alarm in self._alarms}
         texts = [
             (alarm.severity, alarm.text + (_WORDS[alarm.action] if acting else ""))

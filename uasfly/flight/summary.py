@@ -17,6 +17,8 @@ from uasfly.flight.tracking_errors import MarkerDatum, TrackingErrors
 from uasfly.messages import Array, MarkerSample, OdometrySample, Phase, Sample, Status, TruthSample
 from uasfly.preflight_messages import PreflightCheck
 
+_COMPARED = (TruthSample, OdometrySample)
+
 
 def _figures() -> array[float]:
     """Figures of every cycle: eight bytes each, so that an hour of flight is some megabytes."""
@@ -68,7 +70,7 @@ class SummaryCollector:
             self._force_sum += estimate.force_in_world
             self._force_count += 1
         for sample in samples:
-            if isinstance(sample, TruthSample | OdometrySample):
+            if isinstance(sample, _COMPARED):
                 self._errors.hear(sample)
             elif isinstance(sample, MarkerSample):
                 self._sighted_s.append(sample.time_s)

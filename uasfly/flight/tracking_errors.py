@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from uasfly.messages import Array, OdometrySample, TruthSample
+from uasfly.messages import Array, OdometrySample, TruthSample, message
 
 EVERY_CYCLES = 32  # what has come since then is compared together: 0.13 ms, not 27 us in every cycle
 KEPT = 512  # of each kind, seconds: as late truth and GNSS may come
@@ -64,7 +64,7 @@ class SquareSum:
         return {"x": x, "y": y, "z": z, "total": math.sqrt(self.squares.sum() / self.count)}
 
 
-@dataclass(frozen=True, slots=True)
+@message
 class _Cycle:
     time_s: float
     estimate: Array

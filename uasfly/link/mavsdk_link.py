@@ -141,7 +141,8 @@ class MavsdkLink:
             return ()
         self._serve()
         now_s = time.monotonic()
-        waiting = [(arrival, slot.name, text) for slot in self._sample_slots.values() for arrival, text in slot.take()]
+        filled = [slot for slot in self._sample_slots.values() if slot.waiting]
+        waiting = [(arrival, slot.name, text) for slot in filled for arrival, text in slot.take()]
         waiting.sort(key=_arrival)
         texts = [(text, "event") for text in self._events.take()]
         samples: list[Sample] = []
@@ -343,7 +344,7 @@ class MavsdkLink:
     def _serve(self) -> None:
         """Handle what does not wait for `poll`: time, acknowledgements, parameters."""
         for slot, handle in self._service:
-            for arrival_s, text in slot.take():
+            for arrival_s, text in slot.take() if slot.waiting else ():
                 try:
                     handle(from_json(text), arrival_s)
                 except MALFORMED:
@@ -363,7 +364,12 @@ class MavsdkLink:
             self._home.set_result(swap_enu_ned(np.array(numbers)) if all(map(math.isfinite, numbers)) else None)
 
     def _something_waits(self) -> bool:
-        return bool(self._own_samples or self._desk.results or self._events or any(self._sample_slots.values()))
+        return bool(
+            self._own_samples
+            or self._desk.results
+            or self._events
+            or any(slot.waiting for slot in self._sample_slots.values())
+        )
 
     def _say(self, severity: int, text: str) -> None:
         _log.info("%s", text)  # no warning: that would go to a terminal on which somebody draws

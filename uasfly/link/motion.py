@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ Fields = Mapping[str, Any]
 
 FRAME_LOCAL_NED = 1  # MAV_FRAME
 NORM_TOLERANCE = 0.01
-_ODOMETRY = ("x", "y", "z", "vx", "vy", "vz", "rollspeed", "pitchspeed", "yawspeed")
+_odometry = itemgetter("x", "y", "z", "vx", "vy", "vz", "rollspeed", "pitchspeed", "yawspeed")
 CELL_UNKNOWN_MV = 65535
 
 
@@ -26,7 +27,7 @@ def odometry_sample(fields: Fields, time_s: float) -> OdometrySample | None:
     """ODOMETRY in the frame LOCAL_NED; the velocity is in the child frame: LOCAL_NED as PX4 sends it, else body FRD."""
     if fields["frame_id"] != FRAME_LOCAL_NED:
         return None
-    numbers = [fields[name] for name in _ODOMETRY]
+    numbers = _odometry(fields)
     quaternion = unit_quaternion(fields["q"])
     if quaternion is None or None in numbers or not math.isfinite(sum(numbers)):
         return None

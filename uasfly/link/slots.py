@@ -16,36 +16,35 @@ class Slot:
     Args:
         name: of the message.
         keep: how many of the newest messages wait; beyond that the oldest go (`overrun` counts them).
+
+    Attributes:
+        waiting: messages that nobody has taken yet, oldest first, as (arrival on the host's monotonic clock [s], JSON).
     """
 
-    __slots__ = ("_queue", "_stamps", "name", "overrun", "received")
+    __slots__ = ("_stamps", "name", "overrun", "received", "waiting")
 
     def __init__(self, name: str, keep: int) -> None:
         self.name = name
         self.received = 0
         self.overrun = 0
-        self._queue: deque[tuple[float, str]] = deque(maxlen=keep)
+        self.waiting: deque[tuple[float, str]] = deque(maxlen=keep)
         self._stamps: deque[float] = deque(maxlen=RATE_WINDOW)
 
     def put(self, arrival_s: float, text: str) -> None:
         """Add a message: appending to a bounded deque is atomic, so no lock is held in the callback."""
-        if len(self._queue) == self._queue.maxlen:
+        if len(self.waiting) == self.waiting.maxlen:
             self.overrun += 1
-        self._queue.append((arrival_s, text))
+        self.waiting.append((arrival_s, text))
         self._stamps.append(arrival_s)
         self.received += 1
 
     def take(self) -> list[tuple[float, str]]:
-        """All waiting messages, oldest first, as (arrival on the host's monotonic clock [s], JSON)."""
+        """All waiting messages."""
         taken: list[tuple[float, str]] = []
-        queue = self._queue
-        while queue:
-            taken.append(queue.popleft())
+        waiting = self.waiting
+        while waiting:
+            taken.append(waiting.popleft())
         return taken
-
-    def __bool__(self) -> bool:
-        """Whether a message waits."""
-        return bool(self._queue)
 
     def rate_hz(self, now_s: float) -> float:
         """Rate over the last 64 messages; it falls while nothing comes."""

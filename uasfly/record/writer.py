@@ -127,7 +127,7 @@ class BackgroundLogWriter:
         """Open the file (see `LogWriter`) and start the thread."""
         self._writer = LogWriter(path, description)
         self._problem = ""
-        self._queue: queue.SimpleQueue[tuple[Any, float] | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[tuple[tuple[Any, ...], float] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._run, name="flight log", daemon=True)
         self._thread.start()
 
@@ -143,7 +143,11 @@ class BackgroundLogWriter:
 
     def write(self, message: Any, log_time_s: float) -> None:
         """Hand one message over; returns at once."""
-        self._queue.put((message, log_time_s))
+        self._queue.put(((message,), log_time_s))
+
+    def write_all(self, messages: tuple[Any, ...], log_time_s: float) -> None:
+        """Hand the messages of one step over, None standing for nothing; returns at once."""
+        self._queue.put((messages, log_time_s))
 
     def close(self) -> None:
         """Write what is left and close the file, in ten seconds at most; safe to call twice."""
@@ -157,8 +161,11 @@ class BackgroundLogWriter:
         while (item := self._queue.get()) is not None:
             if self._problem:
                 continue
+            messages, log_time_s = item
             try:
-                self._writer.write(*item)
+                for message in messages:
+                    if message is not None:
+                        self._writer.write(message, log_time_s)
             except Exception as error:
                 self._problem = f"the flight log {self.path} stopped: {describe_error(error)}"
         self._writer.close()

@@ -20,11 +20,11 @@ from uasfly.files import find_file
 from uasfly.messages import Array, ReferenceHorizon
 from uasfly.mission import FacingYaw, Mission, WaypointsLeg
 from uasfly.trajectories.mission_trajectory import MissionTrajectory, Span
-from uasfly.trajectories.pieces import CHUNK
 from uasfly.trajectories.placement import AT_ORIGIN
 from uasfly.trajectories.trajectory import TrajectoryError
 
 SAMPLE_S = 0.02
+CHUNK = 4096  # samples looked at together
 COARSE_S = 0.1  # where it is looked at in flight
 ASSUMED_START = np.array((3.0, 0.0, 0.0))  # in the frame of a marker, of which nobody knows yet where it is
 ASSUMED_START.flags.writeable = False

@@ -159,7 +159,7 @@ class MissionTrajectory:
         if self.mission.frame != "local":
             moved._placement = placement
             moved._table = PieceTable(self._pieces, placement)
-            moved._yaw = self._yaw.turned(placement.heading_rad - self._placement.heading_rad)
+            moved._yaw = self._yaw.turned(placement.heading_rad)
         return moved
 
 

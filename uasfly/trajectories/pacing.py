@@ -47,17 +47,17 @@ class Pacing:
 
     def mission_time_s(self, clock_s: float) -> float:
         """The mission's time at a time of the clock."""
-        return self._scalars_at(clock_s)[0]
+        return self.at(clock_s)[0]
 
     def pace(self, clock_s: float) -> float:
         """The rate at a time of the clock."""
-        return self._scalars_at(clock_s)[1]
+        return self.at(clock_s)[1]
 
     def onto(self, timed: Timed, clock_s: Array) -> ReferenceHorizon:
         """The reference at (n,) times of the clock, with its derivatives by the clock."""
         if self._from == self._to or bool((clock_s >= self._clock_s + CHANGE_S).all()):
             return self._onto_steadily(timed, clock_s)
-        mission_s, pace, change = self._at(clock_s)
+        mission_s, pace, change = self._at_all(clock_s)
         reference = timed.sample(mission_s)
         velocity, acceleration = reference.velocity_in_world, reference.acceleration_in_world
         return ReferenceHorizon(
@@ -72,7 +72,7 @@ class Pacing:
     def _onto_steadily(self, timed: Timed, clock_s: Array) -> ReferenceHorizon:
         """The same where the pace does not change, which is nearly always."""
         begin_s, pace = self._clock_s + CHANGE_S, self._to
-        reference = timed.sample(self._scalars_at(begin_s)[0] + pace * (clock_s - begin_s))
+        reference = timed.sample(self.at(begin_s)[0] + pace * (clock_s - begin_s))
         velocity, acceleration = reference.velocity_in_world, reference.acceleration_in_world
         yaw_rate = reference.yaw_rate_rad_s
         if pace != 1.0:
@@ -81,8 +81,8 @@ class Pacing:
             clock_s, reference.position_in_world, velocity, acceleration, reference.yaw_rad, yaw_rate
         )
 
-    def _scalars_at(self, clock_s: float) -> tuple[float, float]:
-        """Mission time and pace at one time of the clock."""
+    def at(self, clock_s: float) -> tuple[float, float]:
+        """The mission's time and its rate at a time of the clock."""
         elapsed = clock_s - self._clock_s
         if self._from == self._to:
             return self._mission_s + self._from * elapsed, self._from
@@ -92,7 +92,7 @@ class Pacing:
         mission = self._mission_s + self._from * elapsed + change * gone
         return mission, self._from + change * u * u * (3.0 - 2.0 * u)
 
-    def _at(self, clock_s: Array) -> tuple[Array, Array, Array]:
+    def _at_all(self, clock_s: Array) -> tuple[Array, Array, Array]:
         """Mission time, pace and its derivative at (n,) times of the clock."""
         elapsed = clock_s - self._clock_s
         u = np.clip(elapsed / CHANGE_S, 0.0, 1.0)

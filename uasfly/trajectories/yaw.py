@@ -8,13 +8,16 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from uasfly.messages import Array
 from uasfly.mission import FacingYaw, FixedYaw, PathYaw
 from uasfly.trajectories.pieces import PieceTable
+from uasfly.trajectories.segments import Segments, segment_function
 
 KNOT_INTERVAL_S = 0.02
 SPEED_UP_S = 0.5  # a turn reaches its highest rate in no less than about this time
@@ -79,7 +82,7 @@ def along(
     if isinstance(rule, FixedYaw):
         return constant(nearest_turn(rule.yaw_rad, before_rad), table.duration_s)
     times = _knot_times(table.duration_s)
-    position, velocity, _ = table.sample_long(times)
+    position, velocity, _ = table.sample(times)
     way = velocity[:, :2] if isinstance(rule, PathYaw) else np.array(rule.point_m) - position[:, :2]
     yaw = np.where(np.hypot(way[:, 0], way[:, 1]) > UNDEFINED_M, np.arctan2(way[:, 1], way[:, 0]), np.nan)
     defined = np.flatnonzero(~np.isnan(yaw))
@@ -98,8 +101,19 @@ def along(
     return YawKnots(times, yaw, rate, asked)
 
 
+@lru_cache(maxsize=1)
+def _yaw_function() -> ca.Function:
+    """Yaw [rad] and its rate [rad/s] from the coefficients (4,) of a cubic."""
+
+    def motion(t: ca.SX, row: ca.SX) -> list[ca.SX]:
+        yaw = row[0] + t * (row[1] + t * (row[2] + t * row[3]))
+        return [yaw, ca.jacobian(yaw, t)]
+
+    return segment_function("uasfly_yaw", 4, motion)
+
+
 class YawTable:
-    """Samples the knots of consecutive spans at many times at once.
+    """Samples the knots of consecutive spans at many times at once; one table is for one thread.
 
     Args:
         spans: the knots.
@@ -108,32 +122,24 @@ class YawTable:
 
     def __init__(self, spans: list[YawKnots], heading_rad: float = 0.0) -> None:
         widths, coefficients = zip(*(_hermite(span) for span in spans), strict=True)
-        width = np.concatenate(widths)
-        self._coefficients = np.concatenate(coefficients, axis=1)
-        self._coefficients[0] += heading_rad
-        self._constant = [not any(cubic) for cubic in self._coefficients[1:].T.tolist()]
-        ends = np.cumsum(width)
-        self._starts = np.concatenate(([0.0], ends[:-1]))
-        self._end = float(ends[-1])
+        self._widths_s, self._coefficients = np.concatenate(widths), np.concatenate(coefficients, axis=1).T
+        self._segments = self._turned(heading_rad)
 
-    def turned(self, angle_rad: float) -> YawTable:
-        """The same with an angle added to every yaw."""
+    def turned(self, heading_rad: float) -> YawTable:
+        """The same with another heading."""
         result = copy.copy(self)
-        result._coefficients = self._coefficients.copy()
-        result._coefficients[0] += angle_rad
+        result._segments = self._turned(heading_rad)
         return result
 
     def sample(self, times_s: Array) -> tuple[Array, Array]:
         """Yaw [rad] and yaw rate [rad/s], (n,) each, at (n,) times, which are clamped."""
-        times = np.minimum(np.maximum(times_s, 0.0), self._end)
-        index = self._starts.searchsorted(times, "right") - 1
-        first = int(index[0]) if times.size else 0
-        if self._constant[first] and not np.count_nonzero(index - first):
-            return np.full(times.size, self._coefficients[0, first]), np.zeros(times.size)
-        t = times - self._starts.take(index)
-        c = self._coefficients.take(index, axis=1)
-        slope = c[1] + t * (2.0 * c[2] + 3.0 * t * c[3])
-        return c[0] + t * (c[1] + t * (c[2] + t * c[3])), slope
+        yaw, rate = self._segments.sample(times_s)
+        return yaw[:, 0], rate[:, 0]
+
+    def _turned(self, heading_rad: float) -> Segments:
+        coefficients = self._coefficients.copy()
+        coefficients[:, 0] += heading_rad
+        return Segments(_yaw_function(), self._widths_s, coefficients)
 
 
 def _knot_times(duration_s: float) -> Array:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from uasfly.flight.monitors.watched import Watched
-from uasfly.messages import StateEstimate
 from uasfly.monitor_settings import EstimateMonitor
 
 
@@ -36,13 +35,11 @@ class UncertainEstimate:
 
 def not_finite(watched: Watched) -> str:
     """Numbers that are none."""
-    return "" if _is_finite(watched.estimate) else "the estimate is not finite"
-
-
-def _is_finite(estimate: StateEstimate) -> bool:
-    return math.isfinite(
+    estimate = watched.estimate
+    total = (
         sum(estimate.position_in_world.tolist())
         + sum(estimate.velocity_in_world.tolist())
         + sum(estimate.quaternion_body_to_world.tolist())
         + sum(estimate.force_in_world.tolist())
     )
+    return "" if math.isfinite(total) else "the estimate is not finite"

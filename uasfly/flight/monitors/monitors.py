@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from uasfly.airframe import Airframe
+from uasfly.control.protocol import ControlResult
 from uasfly.flight.monitors.battery import BatteryEnds, BatteryLow
 from uasfly.flight.monitors.estimate import UncertainEstimate, not_finite
 from uasfly.flight.monitors.gnss import GnssDegraded, GnssDrift, GnssJump, GnssLost
@@ -16,16 +19,24 @@ from uasfly.messages import Alarm
 from uasfly.mission import Mission
 from uasfly.monitor_settings import Monitor
 
+LOOK_S = 0.1  # a finding has to last longer than that to count, but for a few that stay for half a second
+SAME_TIME_S = 1e-6
 _AT_ONCE = Monitor(action="hand_over", after_s=0.0)
 
 
 class Monitors:
-    """Looks at everything that the mission file's section `monitors` names, once a cycle."""
+    """Looks at everything that the mission file's section `monitors` names, ten times a second.
+
+    Attributes:
+        alarms: of the last look, in the mission's order of monitors.
+    """
 
     def __init__(self, mission: Mission, airframe: Airframe) -> None:
         """Take thresholds, limits and speeds."""
         s, limits = mission.monitors, mission.limits
-        fallbacks = Fallbacks(s.solver)
+        self.alarms: tuple[Alarm, ...] = ()
+        self._looked_s = -math.inf
+        self._fallbacks = fallbacks = Fallbacks(s.solver)
         told = Monitor(action="warn", after_s=s.wind.after_s, clear_s=5.0)
         self._watches: tuple[Watch, ...] = (
             Watch("estimate", _AT_ONCE, not_finite),
@@ -54,7 +65,20 @@ class Monitors:
                 Watch("marker_moved", s.marker_moved, MarkerMoved(s.marker_moved), flying_only=False),
             )
 
-    def check(self, watched: Watched) -> tuple[Alarm, ...]:
-        """What is an alarm now, the mission's order of monitors."""
-        alarms = [watch.check(watched) for watch in self._watches]
-        return tuple(alarm for alarm in alarms if alarm is not None)
+    def due(self, time_s: float, control: ControlResult | None) -> bool:
+        """Whether it is time to look again; tell each cycle what has flown in the last one."""
+        self._fallbacks.count(time_s, control)
+        return time_s - self._looked_s >= LOOK_S - SAME_TIME_S
+
+    def look(self, watched: Watched) -> None:
+        """Look at everything."""
+        self._looked_s = watched.time_s
+        alarms: list[Alarm] = []
+        flying = watched.flying
+        for watch in self._watches:
+            text = watch.find(watched) if flying or not watch.flying_only else ""
+            if text or watch.lasts:  # hardly ever
+                alarm = watch.update(watched.time_s, text)
+                if alarm is not None:
+                    alarms.append(alarm)
+        self.alarms = tuple(alarms)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
+from uasfly.control.protocol import ControlResult
 from uasfly.flight.monitors.watched import Watched
 from uasfly.monitor_settings import SolverMonitor
 
@@ -19,10 +20,19 @@ class Fallbacks:
         self._steps: deque[tuple[float, str]] = deque()
         self._counts = {"": 0, "plan": 0, "backup": 0}
 
+    def count(self, time_s: float, control: ControlResult | None) -> None:
+        """Take in a cycle; the result is None where nothing was controlled."""
+        if control is not None:
+            self._steps.append((time_s, control.fallback))
+            self._counts[control.fallback] += 1
+        begin_s = time_s - self._settings.window_s
+        while self._steps and self._steps[0][0] < begin_s:
+            self._counts[self._steps.popleft()[1]] -= 1
+
     def late(self, watched: Watched) -> str:
-        """Looks at the step too: call this one first in each cycle."""
-        self._add(watched)
-        share = self._share("plan", "backup")
+        """Whether too few steps are the solver's own."""
+        del watched
+        share = self._share(self._counts["plan"] + self._counts["backup"])
         if share > self._settings.late_share:
             return f"the solver is late or fails in {share * 100.0:.0f} % of the steps"
         return ""
@@ -30,19 +40,11 @@ class Fallbacks:
     def backup(self, watched: Watched) -> str:
         """Whether the backup flies too much."""
         del watched
-        share = self._share("backup")
+        share = self._share(self._counts["backup"])
         if share > self._settings.backup_share:
             return f"the solver fails: the backup flies {share * 100.0:.0f} % of the time"
         return ""
 
-    def _add(self, watched: Watched) -> None:
-        if watched.control is not None:
-            fallback = watched.control.fallback
-            self._steps.append((watched.time_s, fallback))
-            self._counts[fallback] += 1
-        while self._steps and self._steps[0][0] < watched.time_s - self._settings.window_s:
-            self._counts[self._steps.popleft()[1]] -= 1
-
-    def _share(self, *kinds: str) -> float:
+    def _share(self, steps: int) -> float:
         count = len(self._steps)
-        return sum(self._counts[kind] for kind in kinds) / count if count >= FEWEST_STEPS else 0.0
+        return steps / count if count >= FEWEST_STEPS else 0.0

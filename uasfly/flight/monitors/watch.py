@@ -63,7 +63,12 @@ class Lasting:
 
 
 class Watch:
-    """One monitor: a name, its settings and a function that says what it finds ("" nothing)."""
+    """One monitor: a name, its settings and a function that says what it finds ("" nothing).
+
+    Attributes:
+        find: what is found now. flying_only: looks only while uasfly flies.
+        lasts: something was found or lasts: `update` wants to hear of the next look even where that finds nothing.
+    """
 
     def __init__(
         self, name: str, settings: Monitor, find: Callable[[Watched], str], *, flying_only: bool = True
@@ -77,17 +82,16 @@ class Watch:
             flying_only: looks only while uasfly flies.
         """
         self._name = name
-        self._find = find
-        self._flying_only = flying_only
+        self.find = find
+        self.flying_only = flying_only
+        self.lasts = False
         self._lasting = Lasting(settings)
         self._alarm: Alarm | None = None
 
-    def check(self, watched: Watched) -> Alarm | None:
-        """The alarm that lasts, the same object as long as its action does."""
-        text = "" if self._flying_only and not watched.flying else self._find(watched)
-        if not text and self._lasting.idle:  # nearly always
-            return None
-        action = self._lasting.update(watched.time_s, bool(text))
+    def update(self, time_s: float, text: str) -> Alarm | None:
+        """The alarm that lasts at `time_s`, the same object as long as its action does; `text` is what was found."""
+        action = self._lasting.update(time_s, bool(text))
+        self.lasts = not self._lasting.idle
         if action is Action.NOTHING:
             self._alarm = None
         elif self._alarm is None or self._alarm.action is not action:

@@ -1,10 +1,9 @@
-"""What the monitors look at, once a cycle."""
+"""What the monitors look at."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from uasfly.control.protocol import ControlResult
 from uasfly.flight.view import VehicleView
 from uasfly.messages import Array, Authority, StateEstimate
 from uasfly.observer.diagnosis import Diagnosis
@@ -23,7 +22,6 @@ class Watched:
         origin: (3,) m, world: what geofence and altitudes count from.
         home: (3,) m, world: where the vehicle stood before take-off, or was first met.
         reference: (3,) m, world: where it should be now; None where nothing asks for a place.
-        control: the last step's result, None where nothing was controlled.
         authority: what the wind has taken.
         marker: that the mission hangs on, None where the filter does not know it.
         by_marker: the mission hangs on a marker, and has begun.
@@ -37,7 +35,6 @@ class Watched:
     origin: Array
     home: Array
     reference: Array | None
-    control: ControlResult | None
     authority: Authority
     marker: MarkerEstimate | None = None
     by_marker: bool = False
