@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from uasfly.wind_messages import WindEstimate
+
 Array = NDArray[np.float64]
 
 
@@ -369,6 +371,7 @@ class Status:
         pilot_flies: the mission waits, because somebody else has the vehicle until it is switched to offboard.
         marker_age_s: of the last sighting of the marker that the mission hangs on; NaN without one.
         waits_for: what the vehicle waits for, in offboard, before the legs can begin; "" for nothing.
+        wind: None on the ground, and until it is known.
     """
 
     time_s: float
@@ -393,3 +396,4 @@ class Status:
     pilot_flies: bool = False
     marker_age_s: float = math.nan
     waits_for: str = ""
+    wind: WindEstimate | None = None

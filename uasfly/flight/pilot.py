@@ -40,6 +40,9 @@ from uasfly.mission import Mission
 from uasfly.observer.diagnosis import Diagnosis
 from uasfly.observer.observer import Observer
 from uasfly.preflight_messages import PreflightCheck
+from uasfly.wind.drag_curve import wind_settings
+from uasfly.wind.meter import WindMeter
+from uasfly.wind_messages import WindEstimate
 
 _ENDINGS = {Action.END: None, Action.RETURN: EndingAction.RETURN, Action.LAND: EndingAction.LAND}
 
@@ -102,6 +105,9 @@ class Pilot:
         if mission.marker is not None:
             self._guide = MarkerGuide(mission.marker, marker_id, airframe.limits.yaw_rate_rad_s)
         self._meter = AuthorityMeter(airframe.limits, airframe.model, mission.transition.speed_m_s)
+        wind = wind_settings(airframe)
+        self._wind_meter = None if wind is None else WindMeter(wind, airframe.limits)
+        self._wind: WindEstimate | None = None
         self._response = Response()
         self._phase = self.sequencer.phase  # as far as this object has followed it
         self._ground: Array | None = None  # where the vehicle last stood
@@ -149,6 +155,8 @@ class Pilot:
         if estimate is not None:
             self._note_places(estimate)
 
+        if self._wind_meter is not None:
+            self._wind = self._wind_meter.step(time_s, estimate, self.view.in_air, k_thrust)
         sequencer = self.sequencer
         for number, away_m in self.observer.take_moved():
             self.announce(4, f"bundle {number} is seen {away_m:.2f} m from where it was: moved; it is taken anew")
@@ -283,6 +291,7 @@ class Pilot:
                 authority=authority,
                 marker=None if guide is None else guide.marker,
                 by_marker=guide is not None and self.course.begun,
+                wind=self._wind,
             )
         )
         if guide is not None:
@@ -368,4 +377,5 @@ class Pilot:
             pilot_flies=sequencer.pilot_flies,
             marker_age_s=math.nan if self._guide is None else self._guide.age_s,
             waits_for="the marker" if in_legs and self._guide is not None and not course.begun else "",
+            wind=self._wind,
         )

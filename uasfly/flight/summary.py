@@ -14,6 +14,7 @@ import numpy as np
 
 from uasfly.errors import FileError
 from uasfly.flight.tracking_errors import MarkerDatum, TrackingErrors
+from uasfly.flight.wind_summary import WindSummary
 from uasfly.messages import Array, MarkerSample, OdometrySample, Phase, Sample, Status, TruthSample
 from uasfly.preflight_messages import PreflightCheck
 
@@ -34,6 +35,7 @@ class SummaryCollector:
     duration_s: float = 0.0
     _first_s: float | None = None
     _errors: TrackingErrors = field(default_factory=TrackingErrors)
+    _wind: WindSummary = field(default_factory=WindSummary)
     _force_sum: Array = field(default_factory=lambda: np.zeros(3))
     _force_count: int = 0
     _solve_ms: array[float] = field(default_factory=_figures)
@@ -67,9 +69,12 @@ class SummaryCollector:
             self._errors.cycle(status.time_s, estimate.position_in_world, reference, datum)
             self._force_sum += estimate.force_in_world
             self._force_count += 1
+            self._wind.cycle(status)
         for sample in samples:
             if isinstance(sample, TruthSample | OdometrySample):
                 self._errors.hear(sample)
+                if isinstance(sample, TruthSample):
+                    self._wind.hear(sample)
             elif isinstance(sample, MarkerSample):
                 self._sighted_s.append(sample.time_s)
                 self._sighting_latency_ms.append((status.time_s - sample.time_s) * 1e3)
@@ -130,6 +135,7 @@ class SummaryCollector:
             "rejected": dict(rejected),
             "sightings": self._sightings(),
             "force_m_s2": [round(value, 4) for value in force.tolist()],
+            "wind": self._wind.result(),
             "real_time_factor": round(self.duration_s / wall_s, 3) if wall_s > 0.0 else None,
             "warnings": list(self._warnings),
             "preflight": list(self._preflight),
