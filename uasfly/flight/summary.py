@@ -69,7 +69,6 @@ class SummaryCollector:
             self._errors.cycle(status.time_s, estimate.position_in_world, reference, datum)
             self._force_sum += estimate.force_in_world
             self._force_count += 1
-            self._wind.cycle(status)
         for sample in samples:
             if isinstance(sample, TruthSample | OdometrySample):
                 self._errors.hear(sample)
@@ -78,6 +77,8 @@ class SummaryCollector:
             elif isinstance(sample, MarkerSample):
                 self._sighted_s.append(sample.time_s)
                 self._sighting_latency_ms.append((status.time_s - sample.time_s) * 1e3)
+        if flying and status.leg_started:
+            self._wind.cycle(status)
 
     def abort(self, status: Status) -> None:
         """The flight was broken off outside of the step; `status` tells why, and nothing is computed from it."""

@@ -74,7 +74,8 @@ class WindMeter:
             return None
         self._fresh.append(estimate)
         if time_s >= self._next_s:
-            self._next_s = time_s + INTERVAL_S
+            due_s = self._next_s + INTERVAL_S
+            self._next_s = due_s if due_s > time_s else time_s + INTERVAL_S
             self._latest = self._look(k_thrust_m_s2)
         return self._latest
 
