@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.wind.steady_air import estimates
-from uasfly.airframe import GRAVITY_M_S2
+from uasfly.airframe import GRAVITY_M_S2, WindSettings
+from uasfly.cli.identify import drag
 from uasfly.drivers.plan import load_plan
 from uasfly.drivers.rehearse import rehearse
 from uasfly.drivers.watching import Cycle
-from uasfly.errors import UasflyError
+from uasfly.errors import FileError, UasflyError
 from uasfly.identify.drag import identify_drag, moments
-from uasfly.messages import StateEstimate, Status
+from uasfly.messages import FlightMode, Phase, StateEstimate, Status, VehicleSample
+from uasfly.record.writer import LogWriter
 from uasfly.sim.plant import AIR_DENSITY_KG_M3, Plant
 from uasfly.wind.drag_curve import DragCurve
+from uasfly.yaml_text import parse_yaml
 
 SHORT = [
     "airframe.limits.speed_m_s=10",
@@ -90,3 +96,34 @@ def test_no_flight_at_all_is_refused() -> None:
     for flights in ([], [moments([])]):
         with pytest.raises(UasflyError, match="found 0 s"):
             identify_drag(flights)
+
+
+def test_the_command_reads_logs_and_prints_the_section(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What it prints is a section of an airframe file; as JSON it has the covariance."""
+    log = tmp_path / "flight.mcap"
+    writer = LogWriter(log, {})
+    curve = DragCurve(0.2, 0.015)
+    tracks = [(-9.0, 100.0), (-4.0, 109.0), (4.0, 118.0), (9.0, 127.0)]
+    flown = [e for v, begin_s in tracks for e in estimates(curve, (0.5, 0.0), 8.0, velocity=(v, 0.0), begin_s=begin_s)]
+    for in_air, part in ((False, estimates(DragCurve(1.0, 0.0), (9.0, 0.0), 2.0, begin_s=90.0)), (True, flown)):
+        writer.write(VehicleSample(99.0, FlightMode.OFFBOARD, True, in_air), 99.0)
+        for estimate in part:
+            writer.write(Status(estimate.time_s, Phase.LEGS, 0, True, 0.5, estimate, None), estimate.time_s)
+    writer.close()
+    drag([log], as_json=False)
+    section = capsys.readouterr().out.splitlines()[-1]
+    data: Any = parse_yaml(section, "section").data
+    found = WindSettings(**data["wind"])
+    assert (found.drag_1_s, found.drag_1_m) == pytest.approx((0.2, 0.015), rel=1e-2)
+    drag([log], as_json=True)
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["winds_m_s"] == [pytest.approx([0.5, 0.0], abs=1e-2)]
+    assert np.array(figures["covariance"]).shape == (2, 2)
+
+
+def test_a_log_in_which_nothing_flew_is_refused(tmp_path: Path) -> None:
+    """It names the file."""
+    log = tmp_path / "flight.mcap"
+    LogWriter(log, {}).close()
+    with pytest.raises(FileError, match=r"flight\.mcap: expected a log of a flight"):
+        drag([log], as_json=False)

@@ -53,8 +53,8 @@ class LogReader:
                 return {key: json.loads(value) for key, value in record.metadata.items()}
         raise FileError(str(self.path), ["expected a flight log of uasfly, found no description of a flight in it"])
 
-    def messages(self) -> Iterator[LoggedMessage]:
-        """All messages in the order in which they were written.
+    def messages(self, kinds: tuple[type[Any], ...] = ()) -> Iterator[LoggedMessage]:
+        """All messages, or those of some kinds, in the order in which they were written.
 
         Raises:
             FileError: when the file is no MCAP file; a log that breaks off merely ends early.
@@ -68,7 +68,7 @@ class LogReader:
                 channels[record.id] = schemas.get(record.schema_id, "")
             elif isinstance(record, Message):
                 kind = _TYPES.get(channels.get(record.channel_id, ""))
-                if kind is not None:
+                if kind is not None and (not kinds or kind in kinds):
                     yield LoggedMessage(record.log_time * 1e-9, from_json(kind, record.data))
 
     def _records(self) -> Iterator[Any]:
