@@ -28,6 +28,7 @@ from uasfly.messages import (
     Alarm,
     Array,
     Authority,
+    OdometrySample,
     Phase,
     ReferenceHorizon,
     Request,
@@ -147,16 +148,19 @@ class Pilot:
             samples: what has arrived since the last cycle.
         """
         self.view.update(samples)
+        meter = self._wind_meter
         for sample in samples:
             self.observer.add(sample)
+            if meter is not None and isinstance(sample, OdometrySample):
+                meter.add(sample)
         k_thrust = self.controller.k_thrust_m_s2(self.view.voltage_v)
         self.observer.set_k_thrust(k_thrust)
         estimate = self.observer.estimate(time_s)
         if estimate is not None:
             self._note_places(estimate)
 
-        if self._wind_meter is not None:
-            self._wind = self._wind_meter.step(time_s, estimate, self.view.in_air, k_thrust)
+        if meter is not None:
+            self._wind = meter.step(time_s, estimate, self.view.in_air, k_thrust)
         sequencer = self.sequencer
         for number, away_m in self.observer.take_moved():
             self.announce(4, f"bundle {number} is seen {away_m:.2f} m from where it was: moved; it is taken anew")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,7 +12,7 @@ from uasfly.messages import Status, TruthSample
 from uasfly.wind_messages import WindEstimate
 
 KEPT = 64  # truth samples: more than a second, the wind is told 0.3 s late
-NEAR_S = 0.05  # truth further away from the wind's own time says nothing
+NEAR_S = 0.1  # between two truth samples; further apart they say nothing of the wind between them
 
 
 @dataclass(slots=True)
@@ -44,11 +45,23 @@ class WindSummary:
         self._north += north
         self._gust_m_s = max(self._gust_m_s, wind.gust_m_s)
         self._margin = min(self._margin, wind.margin)
-        near = min(self._truths, key=lambda truth: abs(truth.time_s - wind.time_s), default=None)
-        if near is not None and abs(near.time_s - wind.time_s) < NEAR_S:
-            true_east, true_north, _ = near.wind_in_world.tolist()
+        true = self._true_at(wind.time_s)
+        if true is not None:
             self._compared += 1
-            self._squares += (east - true_east) ** 2 + (north - true_north) ** 2
+            self._squares += (east - true[0]) ** 2 + (north - true[1]) ** 2
+
+    def _true_at(self, time_s: float) -> tuple[float, float] | None:
+        """The true wind, between two samples of it; None where there are none around."""
+        after = bisect_right(self._truths, time_s, key=lambda truth: truth.time_s)
+        if not 0 < after < len(self._truths):
+            return None
+        first, second = self._truths[after - 1], self._truths[after]
+        interval_s = second.time_s - first.time_s
+        if not 0.0 < interval_s < NEAR_S:
+            return None
+        share = (time_s - first.time_s) / interval_s
+        east, north, _ = (first.wind_in_world + share * (second.wind_in_world - first.wind_in_world)).tolist()
+        return east, north
 
     def result(self) -> dict[str, Any] | None:
         """Plain data; None where the wind was never known in the legs."""

@@ -27,7 +27,7 @@ from uasfly.wind.from_force import air_relative
 from uasfly.wind.thrust_free import impulses, slopes, thrust
 
 DENSITY = 0.3  # m/s^2/sqrt(s): how fast the drag of a flight to and fro changes
-EVERY = 10  # steps of the kernel's grid between two moments: 0.2 s
+EVERY = 20  # steps of the kernel's grid between two moments: 0.2 s
 CLUSTER_S = 10.0
 LONGEST_PAUSE_S = 0.3  # between estimates; a longer one parts two stretches
 LEAST_SPEED_M_S, LEAST_MOMENTS = 4.0, 100

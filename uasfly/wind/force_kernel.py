@@ -15,9 +15,9 @@ import numpy as np
 
 from uasfly.messages import Array
 
-STEP_S = 0.02  # of the grid that the kernel works on
-SAMPLES = 75
-LAG = 15  # samples: 0.3 s
+STEP_S = 0.01  # of the grid that the kernel works on
+SAMPLES = 150
+LAG = 30  # samples: 0.3 s
 LAG_S = LAG * STEP_S
 WINDOW_S = (SAMPLES - 1) * STEP_S
 VELOCITY_NOISE_M_S = 0.02  # of one sample on the grid: PX4's velocity, as the scenarios and its own simulator have it

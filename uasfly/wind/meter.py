@@ -1,9 +1,11 @@
-"""The anemometer: wind now, its mean over ten seconds and its gusts, from the observer's estimate.
+"""The anemometer: wind now, its mean over ten seconds and its gusts, from velocity and attitude.
 
-Fed every control cycle, which only keeps the estimate; five times a second the cycles since then are looked at
-together. How much the wind changes is not known beforehand: the force's own changes over a second tell it, and choose
-the kernel. The force is the thrust-free one, not the observer's state: that lags 0.12 s behind gusts, is noisier in
-weak wind, and contains the thrust's errors times the tilt.
+Fed with every odometry sample, which is only kept; five times a second those since then are looked at together. How
+much the wind changes is not known beforehand: the force's own changes over a second tell it, and choose the kernel.
+
+The force is the thrust-free one of PX4's velocity and attitude, not the observer's state: that lags 0.12 s behind
+gusts, is noisier in weak wind, and contains the thrust's errors times the tilt; its velocity lags behind gusts too. The
+observer says which samples are to be believed, and how well the velocity is known.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from uasfly.airframe import GRAVITY_M_S2, Limits, WindSettings
-from uasfly.messages import Array, StateEstimate
+from uasfly.messages import Array, OdometrySample, StateEstimate
 from uasfly.wind.drag_curve import DragCurve
 from uasfly.wind.force_kernel import LAG_S, SAMPLES, STEP_S, WINDOW_S, kernels
 from uasfly.wind.from_force import Uncertainty, air_relative, wind_covariance
@@ -27,13 +29,15 @@ MEAN_S = 10.0
 LEAST_MEAN_S = 1.0  # of wind, before anything is told
 GUST_S = 3.0  # WMO-No. 8: the gust is the largest mean over 3 s,
 GUST_WINDOW_S = 600.0  # here of the last ten minutes (ICAO Annex 3)
-LONGEST_PAUSE_S = 0.3  # between estimates; after a longer one the meter starts again
+LONGEST_PAUSE_S = 0.3  # between samples; after a longer one the meter starts again
+SHORTEST_STEP_S = 1e-3
+BELIEVED_M_S = 0.5  # a velocity farther from the estimate than this, and three sigmas, is an error of PX4's
 UNKNOWN_VELOCITY_M_S = 0.5  # with a velocity that is known no better the vehicle only believes what it knew of the wind
 CHANGE = 5  # intervals over which the force's change is looked at: a second
 CHANGE_MEMORY_S = 5.0
 FIRST_DENSITY = 0.5  # m/s^2/sqrt(s)
 VERTICAL_SHARE = 0.5  # vertical over horizontal gusts near the ground (MIL-F-8785C at 2 m)
-UNSTEADY_SHARE = 0.03  # of the airspeed, one axis: what true velocity and attitude leave open in Dryden gusts
+UNSTEADY_SHARE = 0.02  # of the airspeed, one axis: what true velocity and attitude leave open in Dryden gusts
 IN_MEAN = 0.3  # what is left of errors as long as gusts, a second, in the mean of ten
 _GUST_BIN = 10  # intervals: of two seconds only the strongest gust is kept
 
@@ -52,15 +56,20 @@ class WindMeter:
         self._curve = DragCurve(settings.drag_1_s, settings.drag_1_m)
         self._kernels = kernels()
         self._steps = np.log2([kernel.density for kernel in self._kernels])
-        self._fresh: list[StateEstimate] = []
+        self._arrived: list[OdometrySample] = []
+        self._fresh: list[OdometrySample] = []
         self._latest: WindEstimate | None = None
         self._next_s = -math.inf
         self._begin()
 
+    def add(self, sample: OdometrySample) -> None:
+        """Take in a sample, before the step of its cycle."""
+        self._arrived.append(sample)
+
     def step(
         self, time_s: float, estimate: StateEstimate | None, in_air: bool, k_thrust_m_s2: float
     ) -> WindEstimate | None:
-        """Take in a cycle; the wind is renewed five times a second. None on the ground and until it is known.
+        """The wind, renewed five times a second; None on the ground and until it is known.
 
         Args:
             time_s: now.
@@ -69,19 +78,21 @@ class WindMeter:
             k_thrust_m_s2: thrust acceleration at full thrust.
         """
         if not in_air or estimate is None:
+            self._arrived.clear()
             if self._fresh or self._latest is not None:
                 self._begin()
             return None
-        self._fresh.append(estimate)
+        self._sort_out(estimate)
         if time_s >= self._next_s:
             due_s = self._next_s + INTERVAL_S
             self._next_s = due_s if due_s > time_s else time_s + INTERVAL_S
-            self._latest = self._look(k_thrust_m_s2)
+            self._latest = self._look(estimate, k_thrust_m_s2)
         return self._latest
 
     def _begin(self) -> None:
         """Forget all but how much the wind changes."""
         self._fresh.clear()
+        self._newest_s = -math.inf
         self._latest = None
         self._times: Array = np.empty(0)  # of the last seconds: time, integral of the force, slope, velocity
         self._integral: Array = np.empty((0, 2))
@@ -93,12 +104,14 @@ class WindMeter:
         self._gusts: deque[float] = deque(maxlen=round(GUST_WINDOW_S / INTERVAL_S / _GUST_BIN))
         self._looks = 0
 
-    def _look(self, k_thrust_m_s2: float) -> WindEstimate | None:
-        """Work off the cycles since the last time."""
-        fresh = self._fresh
-        self._fresh = []
-        worst = max(fresh[-1].velocity_sigma_m_s.tolist())
-        if not self._take(fresh) or not worst < UNKNOWN_VELOCITY_M_S:
+    def _look(self, estimate: StateEstimate, k_thrust_m_s2: float) -> WindEstimate | None:
+        """Work off the samples since the last time."""
+        worst = max(estimate.velocity_sigma_m_s.tolist())
+        if not worst < UNKNOWN_VELOCITY_M_S:
+            self._begin()
+            return None
+        self._take()
+        if not len(self._times) or estimate.time_s - float(self._times[-1]) > LONGEST_PAUSE_S:
             self._begin()
             return None
         end_s = float(self._times[-1])
@@ -122,20 +135,37 @@ class WindMeter:
             return None
         return self._tell(then_s, force, slope, speed, worst, kernel.variance, k_thrust_m_s2)
 
-    def _take(self, fresh: list[StateEstimate]) -> bool:
-        """Lengthen what is kept by new estimates; False where they do not follow on each other."""
-        times = np.array([estimate.time_s for estimate in fresh])
-        velocities = np.array([estimate.velocity_in_world for estimate in fresh])
-        slopes_of = slopes(np.array([estimate.quaternion_body_to_world for estimate in fresh]))
+    def _sort_out(self, estimate: StateEstimate) -> None:
+        """Keep what follows in time and is near the estimate; after a pause begin again."""
+        if not self._arrived:
+            return
+        east, north, up = estimate.velocity_in_world.tolist()
+        bound = BELIEVED_M_S + 3.0 * max(estimate.velocity_sigma_m_s.tolist())
+        for sample in self._arrived:
+            x, y, z = sample.velocity_in_world.tolist()
+            near = abs(x - east) < bound and abs(y - north) < bound and abs(z - up) < bound
+            if not near or not math.isfinite(sum(sample.quaternion_body_to_world.tolist())):
+                continue
+            if not self._newest_s + SHORTEST_STEP_S < sample.time_s < estimate.time_s + LONGEST_PAUSE_S:
+                continue
+            if sample.time_s - self._newest_s > LONGEST_PAUSE_S:
+                self._begin()
+            self._newest_s = sample.time_s
+            self._fresh.append(sample)
+        self._arrived.clear()
+
+    def _take(self) -> None:
+        """Lengthen what is kept by the fresh samples."""
+        fresh, self._fresh = self._fresh, []
+        if not fresh:
+            return
+        times = np.array([sample.time_s for sample in fresh])
+        velocities = np.array([sample.velocity_in_world for sample in fresh])
+        slopes_of = slopes(np.array([sample.quaternion_body_to_world for sample in fresh]))
         if len(self._times):
             times = np.concatenate((self._times[-1:], times))
             velocities = np.concatenate((self._velocities[-1:], velocities))
             slopes_of = np.concatenate((self._slopes[-1:], slopes_of))
-        pauses = np.diff(times)
-        if not (np.isfinite(velocities).all() and np.isfinite(slopes_of).all()):
-            return False
-        if len(pauses) and not (pauses.min() > 0.0 and pauses.max() < LONGEST_PAUSE_S):
-            return False
         start = self._integral[-1:] if len(self._integral) else np.zeros((1, 2))
         integral = np.concatenate((start, start + np.cumsum(impulses(times, velocities, slopes_of), axis=0)))
         keep = slice(max(0, int(np.searchsorted(self._times, times[-1] - WINDOW_S)) - 1), max(0, len(self._times) - 1))
@@ -143,7 +173,6 @@ class WindMeter:
         self._velocities = np.concatenate((self._velocities[keep], velocities))
         self._slopes = np.concatenate((self._slopes[keep], slopes_of))
         self._integral = np.concatenate((self._integral[keep], integral))
-        return True
 
     def _follow_changes(self, force: tuple[float, float]) -> None:
         """Density of the force's walk from its change over a second, forgetting."""
