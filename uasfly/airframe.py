@@ -142,10 +142,13 @@ class ObserverNoise(FileModel):
     attitude_density: Annotated[Positive, Field(description="[rad/s/sqrt(Hz)] gyro noise")]
     force_density: Annotated[Positive, Field(description="[m/s^2/sqrt(s)] random walk of the wind force")]
     gnss_bias_density: Annotated[Positive, Field(description="[m/sqrt(s)] random walk of the GNSS bias")]
-    velocity_wander_density: Annotated[
-        NonNegative,
-        Field(description="[m/sqrt(s)] how the integral of PX4's velocity walks away, over many seconds"),
-    ] = 0.08
+    velocity_wander_m_s: Annotated[
+        NonNegative, Field(description="sigma of the slow error of PX4's velocity, on each axis")
+    ] = 0.03
+    attitude_wander_rad: Annotated[
+        NonNegative, Field(description="sigma of the slow error of PX4's attitude, on each axis")
+    ] = 0.003
+    wander_time_s: Annotated[Positive, Field(description="time in which these slow errors forget themselves")] = 4.0
     position_sigma_m: Positive
     attitude_sigma_rad: Positive
     velocity_sigma_m_s: Positive

@@ -29,6 +29,20 @@ def quiet_figure(rows: int, columns: int, inches: tuple[float, float], *, share_
     return figure, panels
 
 
+def spatial_figure(rows: int, columns: int, inches: tuple[float, float]) -> tuple[Any, Any]:
+    """A figure and its three-dimensional axes (rows, columns); arguments as with `quiet_figure`."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=inches, layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, subplot_kw={"projection": "3d"})
+
+
+def legend_below(figure: Any, panel: Any) -> None:
+    """The legend of one of the panels below all of them, where it hides nothing."""
+    handles, labels = panel.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+
+
 def save(figure: Any, path: Path) -> None:
     """Write the picture (PNG); the same figure gives the same bytes."""
     figure.savefig(path, dpi=DOTS_PER_INCH, metadata={"Software": None})

@@ -15,52 +15,35 @@ from tests.winds import wind_estimate
 from uasfly.drivers.live import _LiveFlight
 from uasfly.drivers.plan import load_plan
 from uasfly.drivers.rehearse import rehearse
-from uasfly.link.in_process import InProcessLink
+from uasfly.flight.tracking_errors import MarkerDatum
 from uasfly.messages import Phase, Sample, Status, TruthSample, VehicleSample
 from uasfly.wind_messages import WindEstimate
-
-
-class WatchedLink(InProcessLink):
-    """Keeps the truth, and when the vehicle said first that it flies."""
-
-    truths: list[TruthSample]
-    airborne_s: float
-
-    def truth(self) -> TruthSample:
-        """The true state now."""
-        truth = super().truth()
-        WatchedLink.truths.append(truth)
-        return truth
-
-    def poll(self) -> tuple[Sample, ...]:
-        """Samples that have arrived."""
-        samples = super().poll()
-        for sample in samples:
-            if isinstance(sample, VehicleSample) and sample.in_air:
-                WatchedLink.airborne_s = min(WatchedLink.airborne_s, sample.time_s)
-        return samples
 
 
 class Flown:
     """A rehearsal's winds in the legs, the true one around them, and the summary."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, airframe: str, settings: list[str]) -> None:
-        monkeypatch.setattr("uasfly.drivers.rehearse.InProcessLink", WatchedLink)
-        WatchedLink.truths, WatchedLink.airborne_s = [], math.inf
+    def __init__(self, airframe: str, settings: list[str]) -> None:
         self.statuses: list[Status] = []
+        self.airborne_s = math.inf
+        self._truths: list[TruthSample] = []
         plan = load_plan("hover", airframe, scenario="gusty", seed=3, settings=settings)
-        self.summary: dict[str, Any] = rehearse(plan, watch=lambda status, _: self.statuses.append(status))
-        self.airborne_s = WatchedLink.airborne_s
-        self._times = np.array([truth.time_s for truth in WatchedLink.truths])
-        self._winds = np.array([truth.wind_in_world[:2] for truth in WatchedLink.truths])
+        self.summary: dict[str, Any] = rehearse(plan, witness=self._see)
+        self._times = np.array([truth.time_s for truth in self._truths])
+        self._winds = np.array([truth.wind_in_world[:2] for truth in self._truths])
         self.winds: list[WindEstimate] = []
         for status in self.statuses:
-            if (
-                status.phase is Phase.LEGS
-                and status.wind is not None
-                and not (self.winds and status.wind is self.winds[-1])
-            ):
-                self.winds.append(status.wind)
+            wind = status.wind
+            if status.phase is Phase.LEGS and wind is not None and not (self.winds and wind is self.winds[-1]):
+                self.winds.append(wind)
+
+    def _see(self, status: Status, samples: tuple[Sample, ...], _: MarkerDatum | None) -> None:
+        self.statuses.append(status)
+        for sample in samples:
+            if isinstance(sample, TruthSample):
+                self._truths.append(sample)
+            elif isinstance(sample, VehicleSample) and sample.in_air:
+                self.airborne_s = min(self.airborne_s, sample.time_s)
 
     def at(self, time_s: float) -> NDArray[np.float64]:
         """The true wind."""
@@ -74,14 +57,14 @@ class Flown:
 
 
 @pytest.mark.parametrize("airframe", ["f550", "aurelia_x6"])
-def test_the_wind_in_a_gusty_hover_is_the_true_one(monkeypatch: pytest.MonkeyPatch, airframe: str) -> None:
+def test_the_wind_in_a_gusty_hover_is_the_true_one(airframe: str) -> None:
     """8 m/s at 10 m with Dryden gusts, all sensors noisy: mean of 10 s, direction, gusts and sigmas.
 
     Speed to 0.3 m/s and direction to 4 degrees RMS, the present wind to 0.6 m/s, known within 5 s in the air and before
     offboard. The normalised errors stay below the upper bound of chi-square; errors of the attitude last, so that half
     a minute is about four independent samples of the mean's.
     """
-    flown = Flown(monkeypatch, airframe, ["mission.legs[0].duration_s=25"])
+    flown = Flown(airframe, ["mission.legs[0].duration_s=25"])
     assert flown.summary["outcome"] == "completed"
     first = next(status for status in flown.statuses if status.wind is not None)
     assert first.phase is Phase.TAKEOFF

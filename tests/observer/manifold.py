@@ -15,17 +15,15 @@ from uasfly.observer import states as s
 
 
 def plus_core(core: Array, error: Array) -> Array:
-    """Core state (16,) with an error (15,) added."""
+    """Core state (22,) with an error (21,) added."""
     turned = quaternion_product(core[s.QUATERNION], quaternion_from_rotation_vector(error[s.D_ATTITUDE]))
-    return np.concatenate(
-        (core[:6] + error[:6], turned, core[s.FORCE] + error[s.D_FORCE], core[s.BIAS] + error[s.D_BIAS])
-    )
+    return np.concatenate((core[:6] + error[:6], turned, core[10:22] + error[9:21]))
 
 
 def minus_core(core: Array, other: Array) -> Array:
-    """Error (15,) with plus_core(core, error) == other."""
+    """Error (21,) with plus_core(core, error) == other."""
     turn = turn_between(core[s.QUATERNION], other[s.QUATERNION])
-    return np.concatenate((other[:6] - core[:6], turn, other[10:16] - core[10:16]))
+    return np.concatenate((other[:6] - core[:6], turn, other[10:22] - core[10:22]))
 
 
 def plus_pose(pose: Array, error: Array) -> Array:
@@ -66,11 +64,12 @@ def evaluated(build: Callable[..., ca.SX | tuple[ca.SX, ...]], *arguments: Array
 
 
 def random_core(rng: np.random.Generator) -> Array:
-    """Core state (16,) of a vehicle somewhere in the world, tilted and moving."""
+    """Core state (22,) of a vehicle somewhere in the world, tilted and moving."""
     core = rng.standard_normal(s.CORE_NOMINAL)
     core[s.POSITION] *= 10.0
     core[s.VELOCITY] *= 3.0
     core[s.QUATERNION] /= np.linalg.norm(core[s.QUATERNION])
+    core[s.ATTITUDE_WANDER] *= 0.1
     return core
 
 
@@ -93,4 +92,7 @@ def flying_inputs(rng: np.random.Generator, dt_s: float) -> Array:
     inputs[s.IN_ACCELERATION_DENSITY] = 0.1**2
     inputs[s.IN_ATTITUDE_DENSITY] = 0.02**2
     inputs[s.IN_DRAG] = (0.26, 0.2, 0.1)
+    inputs[s.IN_WANDER_RATE] = 0.5
+    inputs[s.IN_VELOCITY_WANDER_DENSITY] = 0.02**2
+    inputs[s.IN_ATTITUDE_WANDER_DENSITY] = 0.002**2
     return inputs

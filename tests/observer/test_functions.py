@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from tests.observer.manifold import evaluated, flying_inputs, plus_core, plus_pose, random_core, random_pose
+from tests.observer.test_measurements import attitude_as_told
 from tests.observer.truth import turn_between
 from uasfly.messages import Array
 from uasfly.observer import error_state as es
 from uasfly.observer import functions
+from uasfly.observer import measurements as me
 from uasfly.observer import states as s
 from uasfly.observer.update import GATE_3
 
@@ -36,13 +38,13 @@ def odometry_inputs(core: Array, rng: np.random.Generator) -> Array:
     inputs[: s.PREDICTION_INPUTS] = flying_inputs(rng, 0.01)
     predicted = evaluated(es.predict_nominal, core, inputs[: s.PREDICTION_INPUTS])[0]
     seen = plus_core(predicted, 0.01 * rng.standard_normal(s.CORE_ERROR))
-    inputs[s.IN_QUATERNION] = seen[s.QUATERNION]
+    inputs[s.IN_QUATERNION] = attitude_as_told(seen)
     inputs[s.IN_POSITION] = seen[s.POSITION] + seen[s.BIAS]
-    inputs[s.IN_VELOCITY] = seen[s.VELOCITY]
+    inputs[s.IN_VELOCITY] = seen[s.VELOCITY] + seen[s.VELOCITY_WANDER]
     inputs[s.IN_USE] = 1.0
     inputs[s.IN_CORRELATION] = (1.0, 3.0, 2.0)
     inputs[s.IN_VARIANCE] = VARIANCES
-    inputs[s.IN_WEIGHTS] = (0.01, 0.01, 0.04, 1.0, 1.0)
+    inputs[s.IN_WEIGHTS] = (0.01, 0.01, 0.04, 1.0, 1.0, 1.0)
     return inputs
 
 
@@ -65,31 +67,34 @@ def test_an_odometry_step_is_the_textbook_filter(markers: int, bias_free: float)
     rng = np.random.default_rng(3 + markers)
     layout, packed = s.Layout(markers), packed_state(markers, rng)
     inputs = odometry_inputs(packed[: s.CORE_NOMINAL], rng)
-    inputs[s.IN_BIAS_FREE] = bias_free
+    inputs[s.IN_BIAS_FREE] = inputs[s.IN_WANDER_FREE] = bias_free
     result, outputs = evaluate_step(packed, inputs, markers)
 
     motion = inputs[: s.PREDICTION_INPUTS]
     core = packed[: s.CORE_NOMINAL]
     n = layout.errors
     Phi, Q = np.eye(n), np.zeros((n, n))
-    Phi[:15, :15] = evaluated(es.transition, core, motion)[0]
-    Q[:15, :15] = evaluated(es.noise_covariance, core, motion)[0]
+    core_part = slice(0, s.CORE_ERROR)
+    Phi[core_part, core_part] = evaluated(es.transition, core, motion)[0]
+    Q[core_part, core_part] = evaluated(es.noise_covariance, core, motion)[0]
     P = Phi @ covariance_of(packed, layout) @ Phi.T + Q
     predicted = evaluated(es.predict_nominal, core, motion)[0]
     allowed = np.eye(n)
     if not bias_free:
         allowed[s.D_POSITION, s.D_BIAS] = np.eye(3)
-        allowed[s.D_BIAS, s.D_BIAS] = 0.0
+        allowed[s.D_BIAS, s.D_BIAS] = allowed[s.D_VELOCITY_WANDER, s.D_VELOCITY_WANDER] = 0.0
     errors = np.zeros(n)
     for k, part in enumerate((s.D_ATTITUDE, s.D_POSITION, s.D_VELOCITY)):
         H = np.zeros((3, n))
         H[:, part] = np.eye(3)
-        if k == s.POSITION_SENSOR:
-            H[:, s.D_BIAS] = np.eye(3)
+        if k == s.ATTITUDE_SENSOR:
+            H[:, core_part] = evaluated(lambda x: me.odometry_jacobian(x, s.ATTITUDE_SENSOR), predicted)[0]
+        else:
+            H[:, s.D_BIAS if k == s.POSITION_SENSOR else s.D_VELOCITY_WANDER] = np.eye(3)
         innovation = (
-            turn_between(predicted[s.QUATERNION], inputs[s.IN_QUATERNION]),
+            turn_between(attitude_as_told(predicted), inputs[s.IN_QUATERNION]),
             inputs[s.IN_POSITION] - predicted[s.POSITION] - predicted[s.BIAS],
-            inputs[s.IN_VELOCITY] - predicted[s.VELOCITY],
+            inputs[s.IN_VELOCITY] - predicted[s.VELOCITY] - predicted[s.VELOCITY_WANDER],
         )[k] - H @ errors
         S = H @ P @ H.T + VARIANCES[k] * np.eye(3)
         assert outputs[s.OUT_NIS][k] == pytest.approx(innovation @ np.linalg.solve(S, innovation), rel=1e-8)
@@ -100,7 +105,7 @@ def test_an_odometry_step_is_the_textbook_filter(markers: int, bias_free: float)
         P = (np.eye(n) - K @ H) @ P @ (np.eye(n) - K @ H).T + K @ R @ K.T
     reset = np.eye(n)
     reset[6:9, 6:9] = evaluated(es.reset_jacobian, errors[6:9])[0]
-    expected = [plus_core(predicted, errors[:15])]
+    expected = [plus_core(predicted, errors[core_part])]
     for k in range(markers):
         part = s.marker_error(k)
         reset[part.start + 3 : part.stop, part.start + 3 : part.stop] = evaluated(es.reset_jacobian, errors[part][3:])[

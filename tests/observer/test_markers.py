@@ -48,7 +48,7 @@ def test_first_sight_gives_pose_covariance_and_correlation(markers: int) -> None
     noises = rng.multivariate_normal(np.zeros(6), 0.01 * COVARIANCE, 8000)
     marker_errors = np.array(
         [
-            minus_pose(located, located_from(plus_core(core, error[:15]), plus_pose(seen, noise)))
+            minus_pose(located, located_from(plus_core(core, error[: s.CORE_ERROR]), plus_pose(seen, noise)))
             for error, noise in zip(errors, noises, strict=True)
         ]
     )
@@ -68,8 +68,8 @@ def test_a_second_sighting_corrects_vehicle_and_marker_as_the_textbook_does() ->
     sighting = Sighting(0.0, 7, plus_pose(expected_view, 0.01 * rng.standard_normal(6)), COVARIANCE)
     result = MarkerAlgebra().sighting(packed, 2, 1, sighting, 1.0, 0.0)
     H = np.zeros((6, layout.errors))
-    for k in range(15):
-        step = 1e-6 * np.eye(15)[k]
+    for k in range(s.CORE_ERROR):
+        step = 1e-6 * np.eye(s.CORE_ERROR)[k]
         views = [minus_pose(expected_view, seen_from(plus_core(core, sign * step), marker)) for sign in (1, -1)]
         H[:, k] = (views[0] - views[1]) / 2e-6
     for k in range(6):
@@ -82,7 +82,7 @@ def test_a_second_sighting_corrects_vehicle_and_marker_as_the_textbook_does() ->
     error = P @ H.T @ np.linalg.solve(S, innovation)
     assert result.accepted
     assert result.nis == pytest.approx(innovation @ np.linalg.solve(S, innovation), rel=1e-4)
-    np.testing.assert_allclose(result.packed[: s.CORE_NOMINAL], plus_core(core, error[:15]), atol=1e-6)
+    np.testing.assert_allclose(result.packed[: s.CORE_NOMINAL], plus_core(core, error[: s.CORE_ERROR]), atol=1e-6)
     for k in range(2):
         moved = plus_pose(packed[s.marker_nominal(k)], error[s.marker_error(k)])
         np.testing.assert_allclose(result.packed[s.marker_nominal(k)], moved, atol=1e-6)

@@ -80,6 +80,8 @@ class Flights:
     quaternion: Array
     force: Array
     bias: Array
+    velocity_wander: Array
+    attitude_wander: Array
 
     def advance(self, airframe: Airframe, until_s: float, rng: np.random.Generator) -> None:
         """Integrate eq. 1 with the airframe's noise densities to `until_s`."""
@@ -104,6 +106,12 @@ class Flights:
             self.velocity, self.quaternion = velocity, end
             self.force = self.force + noise.force_density * root * rng.standard_normal(shape)
             self.bias = self.bias + noise.gnss_bias_density * root * rng.standard_normal(shape)
+            keep = np.exp(-h / noise.wander_time_s)
+            fresh = (1.0 - keep**2) ** 0.5
+            drawn = noise.velocity_wander_m_s * rng.standard_normal(shape)
+            self.velocity_wander = keep * self.velocity_wander + fresh * drawn
+            drawn = noise.attitude_wander_rad * rng.standard_normal(shape)
+            self.attitude_wander = keep * self.attitude_wander + fresh * drawn
             self.time_s += h
         self.time_s = until_s
 
@@ -111,9 +119,9 @@ class Flights:
         """One sample a flight, with the airframe's configured noise."""
         noise, shape = airframe.observer, self.position.shape
         position = self.position + self.bias + noise.position_sigma_m * rng.standard_normal(shape)
-        velocity = self.velocity + noise.velocity_sigma_m_s * rng.standard_normal(shape)
+        velocity = self.velocity + self.velocity_wander + noise.velocity_sigma_m_s * rng.standard_normal(shape)
         turn = noise.attitude_sigma_rad * rng.standard_normal(shape)
-        quaternion = products(self.quaternion, exponentials(turn))
+        quaternion = products(products(self.quaternion, exponentials(self.attitude_wander)), exponentials(turn))
         rate = turn_rate(self.time_s)
         return [
             OdometrySample(self.time_s, position[k], velocity[k], quaternion[k], rate.copy())
@@ -142,6 +150,8 @@ class Flights:
             turn_between(nominal[s.QUATERNION], self.quaternion[run]),
             self.force[run] - nominal[s.FORCE],
             self.bias[run] - nominal[s.BIAS],
+            self.velocity_wander[run] - nominal[s.VELOCITY_WANDER],
+            self.attitude_wander[run] - nominal[s.ATTITUDE_WANDER],
         ]
         if moment.markers and marker is not None:
             pose = nominal[s.marker_nominal(0)]
@@ -155,11 +165,21 @@ def turn_between(start: Array, end: Array) -> Array:
 
 
 def flights(airframe: Airframe, runs: int, rng: np.random.Generator) -> Flights:
-    """Flights at time 0 with a wind force drawn from the filter's prior and no GNSS bias."""
+    """Flights at time 0 with a wind force and wanders drawn from the filter's prior and no GNSS bias."""
     level = np.zeros((runs, 4))
     level[:, 0] = 1.0
     zeros = np.zeros((runs, 3))
-    return Flights(0.0, zeros + np.array((0.0, 0.0, 2.0)), zeros, level, rng.standard_normal((runs, 3)), zeros)
+    noise = airframe.observer
+    return Flights(
+        0.0,
+        zeros + np.array((0.0, 0.0, 2.0)),
+        zeros,
+        level,
+        rng.standard_normal((runs, 3)),
+        zeros,
+        noise.velocity_wander_m_s * rng.standard_normal((runs, 3)),
+        noise.attitude_wander_rad * rng.standard_normal((runs, 3)),
+    )
 
 
 def nees(error: Array, covariance: Array) -> float:

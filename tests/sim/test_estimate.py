@@ -121,6 +121,22 @@ def test_gnss_walks_as_the_paper_says() -> None:
     assert np.sqrt((spread**2).mean()) == pytest.approx(0.2 * math.sqrt(2.0), rel=0.2)
 
 
+def test_gnss_is_sound_until_it_walks() -> None:
+    """With `walk_from_s` the bias stays as it begins until then."""
+    gnss = Gnss(white_sigma_m=0.0, random_walk_m_sqrt_s=0.2, initial_bias_m=(1.0, 0.0, 0.0), walk_from_s=1.0)
+    sensors = Sensors.model_validate(
+        {**QUIET.model_dump(), "position": "gnss", "position_noise_m": None, "gnss": gnss, "position_rate_hz": 10.0}
+    )
+    estimate = Estimate(sensors, np.random.default_rng(1), state_at(0.0), STEP)
+    biases = []
+    for _ in range(round(2.0 / STEP)):
+        biases.append(estimate.position_bias)
+        estimate.advance()
+    last_sound = round(1.0 / STEP)
+    assert set(biases[:last_sound]) == {(1.0, 0.0, 0.0)}
+    assert len(set(biases[last_sound:])) >= 10
+
+
 def test_delays_age_the_samples() -> None:
     """With a position delay of 40 ms the sample tells where the vehicle was 40 ms before."""
     sensors = QUIET.model_copy(update={"delays": Delays(position_s=0.04)})

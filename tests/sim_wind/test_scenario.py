@@ -23,6 +23,13 @@ def test_gnss_error_over_seeds_has_the_expected_rms() -> None:
     assert math.sqrt(float(np.mean(square))) == pytest.approx(gnss.expected_rms_m(120.0), rel=0.03)
 
 
+def test_gnss_error_that_begins_later_by_hand() -> None:
+    """Walking for the second minute of two: 3 * 0.1^2 * 60^2 / (2 * 120) = 0.45 m^2; before it begins, nothing."""
+    gnss = Gnss(white_sigma_m=0.0, random_walk_m_sqrt_s=0.1, walk_from_s=60.0)
+    assert gnss.expected_rms_m(120.0) == pytest.approx(math.sqrt(0.45))
+    assert gnss.expected_rms_m(60.0) == 0.0
+
+
 def test_gnss_degraded_is_scaled_to_the_papers_error() -> None:
     """The shipped scenario expects 1.28 m RMS over the first two minutes, with eq. 11's white noise of 1e-3 m^2."""
     sensors = load_file(find_file("scenario", "gnss_degraded"), Scenario).sensors

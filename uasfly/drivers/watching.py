@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from uasfly.errors import describe_error
-from uasfly.messages import Status
+from uasfly.flight.tracking_errors import MarkerDatum
+from uasfly.messages import Sample, Status
 
 BACKLOG = 200  # steps that wait for a terminal; beyond them only those that announce something are kept
 CLOSE_TIMEOUT_S = 1.0
@@ -30,6 +31,8 @@ class Cycle:
 
 
 Watch = Callable[[Status, Cycle], None]
+# A step's status, the samples that it took in with the truth among them, and where the marker is (see `TrueMarkers`).
+Witness = Callable[[Status, tuple[Sample, ...], MarkerDatum | None], None]
 
 
 class BackgroundWatch:

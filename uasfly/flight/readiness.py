@@ -6,7 +6,7 @@ from uasfly.flight.view import VehicleView
 from uasfly.messages import StateEstimate
 
 VELOCITY_SIGMA_READY_M_S = 0.2
-POSITION_SIGMA_READY_M = 5.0  # GNSS drifts unseen while the vehicle waits on the ground, so this one cannot be tight
+POSITION_SIGMA_READY_M = 10.0  # GNSS drifts unseen while the vehicle waits on the ground, so this one cannot be tight
 
 
 def unready(view: VehicleView, estimate: StateEstimate | None) -> str:

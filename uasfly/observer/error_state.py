@@ -51,6 +51,8 @@ def retract(nominal: ca.SX, error: ca.SX) -> ca.SX:
         quaternion_product(nominal[s.QUATERNION], exponential(error[s.D_ATTITUDE])),
         nominal[s.FORCE] + error[s.D_FORCE],
         nominal[s.BIAS] + error[s.D_BIAS],
+        nominal[s.VELOCITY_WANDER] + error[s.D_VELOCITY_WANDER],
+        nominal[s.ATTITUDE_WANDER] + error[s.D_ATTITUDE_WANDER],
     ]
     parts += [retract_pose(nominal[s.marker_nominal(k)], error[s.marker_error(k)]) for k in range(markers)]
     return ca.vertcat(*parts)
@@ -86,7 +88,7 @@ def _rate(nominal: ca.SX, inputs: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
 
 
 def predict_nominal(core: ca.SX, inputs: ca.SX) -> ca.SX:
-    """Core nominal state (16,) after IN_DT: attitude exact for a constant rate, the rest by Runge-Kutta 4."""
+    """Core nominal state (22,) after IN_DT: attitude and wanders exact for constant rates, else Runge-Kutta 4."""
     dt = inputs[s.IN_DT]
     half_turn = exponential(0.5 * dt * inputs[s.IN_RATE])
     start = core[s.QUATERNION]
@@ -94,7 +96,7 @@ def predict_nominal(core: ca.SX, inputs: ca.SX) -> ca.SX:
     end = quaternion_product(middle, half_turn)
 
     def rates(position: ca.SX, velocity: ca.SX, quaternion: ca.SX) -> tuple[ca.SX, ca.SX]:
-        return _rate(ca.vertcat(position, velocity, quaternion, core[s.FORCE], core[s.BIAS]), inputs)[:2]
+        return _rate(ca.vertcat(position, velocity, quaternion, core[s.FORCE]), inputs)[:2]
 
     position, velocity = core[s.POSITION], core[s.VELOCITY]
     p1, v1 = rates(position, velocity, start)
@@ -107,18 +109,19 @@ def predict_nominal(core: ca.SX, inputs: ca.SX) -> ca.SX:
         end,
         core[s.FORCE],
         core[s.BIAS],
+        ca.exp(-dt * inputs[s.IN_WANDER_RATE]) * core[s.BIAS.stop :],
     )
 
 
 def difference_between(nominal: ca.SX, other: ca.SX) -> ca.SX:
-    """Core error (15,) that leads from `nominal` to `other`, to first order (its derivative at zero error is exact)."""
+    """Core error (21,) that leads from `nominal` to `other`, to first order (its derivative at zero error is exact)."""
     turn = quaternion_product(conjugate(nominal[s.QUATERNION]), other[s.QUATERNION])
     return ca.vertcat(
         other[s.POSITION] - nominal[s.POSITION],
         other[s.VELOCITY] - nominal[s.VELOCITY],
         2.0 * turn[1:],
         other[s.FORCE] - nominal[s.FORCE],
-        other[s.BIAS] - nominal[s.BIAS],
+        other[s.BIAS.start :] - nominal[s.BIAS.start :],
     )
 
 
@@ -128,7 +131,7 @@ def at_zero(expression: ca.SX, error: ca.SX) -> ca.SX:
 
 
 def along_manifold(difference: Callable[[ca.SX, ca.SX], ca.SX], core: ca.SX) -> ca.SX:
-    """Derivative (15, 15) at zero error of a core difference, given as a function of the core and the error.
+    """Derivative (21, 21) at zero error of a core difference, given as a function of the core and the error.
 
     The attitude's rows are left-invariant, the same at every attitude: taken at the identity they come out short.
     """
@@ -140,7 +143,7 @@ def along_manifold(difference: Callable[[ca.SX, ca.SX], ca.SX], core: ca.SX) -> 
 
 
 def transition(core: ca.SX, inputs: ca.SX) -> ca.SX:
-    """Transition matrix (15, 15) of the error over IN_DT: the derivative of `predict_nominal` along the manifold."""
+    """Transition matrix (21, 21) of the error over IN_DT: the derivative of `predict_nominal` along the manifold."""
 
     def difference(start: ca.SX, error: ca.SX) -> ca.SX:
         return difference_between(predict_nominal(start, inputs), predict_nominal(retract(start, error), inputs))
@@ -149,7 +152,7 @@ def transition(core: ca.SX, inputs: ca.SX) -> ca.SX:
 
 
 def error_dynamics(core: ca.SX, inputs: ca.SX) -> ca.SX:
-    """Matrix A (15, 15) [1/s] of the error's linear dynamics error' = A error + noise (eq. 5)."""
+    """Matrix A (21, 21) [1/s] of the error's linear dynamics error' = A error + noise (eq. 5)."""
 
     def rate_difference(start: ca.SX, error: ca.SX) -> ca.SX:
         moved = retract(start, error)
@@ -163,16 +166,17 @@ def error_dynamics(core: ca.SX, inputs: ca.SX) -> ca.SX:
             moved_acceleration - acceleration,
             2.0 * turn_rate[1:],
             ca.SX.zeros(6),
+            -inputs[s.IN_WANDER_RATE] * error[s.D_BIAS.stop :],
         )
 
     return along_manifold(rate_difference, core)
 
 
 def noise_covariance(core: ca.SX, inputs: ca.SX, order: int = 5) -> ca.SX:
-    """Covariance (15, 15) that the continuous noise adds over IN_DT: Van Loan's integral as a series in dt.
+    """Covariance (21, 21) that the continuous noise adds over IN_DT: Van Loan's integral as a series in dt.
 
     Q(dt) = sum M_k dt^k with M_1 the noise densities and M_{k+1} = (A M_k + M_k A') / (k + 1). A is nilpotent but for
-    drag and turn rate, so that five terms leave a relative error of about (|omega| dt)^5.
+    drag, turn rate and the wanders' slow decay, so that five terms leave a relative error of about (|omega| dt)^5.
     """
     densities = ca.vertcat(
         ca.SX(3, 1),
@@ -180,6 +184,8 @@ def noise_covariance(core: ca.SX, inputs: ca.SX, order: int = 5) -> ca.SX:
         ca.repmat(inputs[s.IN_ATTITUDE_DENSITY], 3, 1),
         ca.repmat(inputs[s.IN_FORCE_DENSITY], 3, 1),
         ca.repmat(inputs[s.IN_BIAS_DENSITY], 3, 1),
+        ca.repmat(inputs[s.IN_VELOCITY_WANDER_DENSITY], 3, 1),
+        ca.repmat(inputs[s.IN_ATTITUDE_WANDER_DENSITY], 3, 1),
     )
     dynamics = error_dynamics(core, inputs)
     dt = inputs[s.IN_DT]

@@ -18,7 +18,7 @@ def expected_marker(moment: Moment, core: Array, marker_id: int) -> MarkerPredic
 
     Args:
         moment: of the filter; its covariance counts.
-        core: (16,) nominal core state at the time that is meant.
+        core: (22,) nominal core state at the time that is meant.
         marker_id: which marker.
     """
     if marker_id not in moment.markers:

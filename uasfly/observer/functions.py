@@ -60,12 +60,8 @@ def _function(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Fun
 def _predicted_covariance(covariance: ca.SX, core: ca.SX, inputs: ca.SX) -> ca.SX:
     """Phi P Phi' + Q; markers are at rest (eq. 3), so that only their correlation with the core turns."""
     n = covariance.shape[0]
-    own = es.noise_covariance(core, inputs)
-    if n > s.CORE_ERROR:  # only a marker tells a wandering velocity from motion
-        for axis in range(s.D_POSITION.start, s.D_POSITION.stop):
-            own[axis, axis] += inputs[s.IN_DT] * inputs[s.IN_WANDER_DENSITY]
     move = ca.diagcat(es.transition(core, inputs), ca.SX.eye(n - s.CORE_ERROR))
-    noise = ca.diagcat(own, ca.SX(n - s.CORE_ERROR, n - s.CORE_ERROR))
+    noise = ca.diagcat(es.noise_covariance(core, inputs), ca.SX(n - s.CORE_ERROR, n - s.CORE_ERROR))
     return up.symmetric(ca.mtimes(ca.mtimes(move, covariance), move.T) + noise)
 
 
@@ -113,7 +109,7 @@ def odometry_step(markers: int) -> ca.Function:
         free = inputs[s.IN_BIAS_FREE]
         if sensor == s.POSITION_SENSOR:
             free = ca.fmax(free, state.jumped * (1.0 - motion))
-        allowed = _held_bias(free, layout)
+        allowed = _held(free, inputs[s.IN_WANDER_FREE], layout)
         jacobian = ca.horzcat(me.odometry_jacobian(core, sensor), ca.SX(3, layout.errors - s.CORE_ERROR))
         residual = innovations[sensor] - ca.mtimes(jacobian, error)
         expected = ca.mtimes(ca.mtimes(jacobian, covariance), jacobian.T)
@@ -154,18 +150,19 @@ class _Sensor:
         self.jumped = ca.dot(mean, mean) > JUMP_SIGMAS**2 * self.variance
 
 
-def _held_bias(free: ca.SX, layout: s.Layout) -> ca.SX:
-    """Matrix (n, n) on the gain that holds the GNSS bias where `free` is 0.
+def _held(bias_free: ca.SX, wander_free: ca.SX, layout: s.Layout) -> ca.SX:
+    """Matrix (n, n) on the gain that holds the GNSS bias and the velocity's wander where they are not free (0).
 
     GNSS alone sees only the sum p + b. What an innovation says of that sum then goes to the position, and the bias
     stays: the position follows GNSS, and the two cannot drift apart. The bias's noise goes on, so that the covariance
     (Joseph) tells how far position and bias, with opposite signs, may have gone. When a marker frees the bias nothing
     jumps. A measured position that has jumped against everything else frees it too: that is an error of GNSS, and the
-    vehicle has not moved.
+    vehicle has not moved. The velocity's wander is left to markers: GNSS that drifts would pass for it.
     """
     allowed = ca.SX.eye(layout.errors)
-    allowed[s.D_POSITION, s.D_BIAS] = (1.0 - free) * ca.SX.eye(3)
-    allowed[s.D_BIAS, s.D_BIAS] = free * ca.SX.eye(3)
+    allowed[s.D_POSITION, s.D_BIAS] = (1.0 - bias_free) * ca.SX.eye(3)
+    allowed[s.D_BIAS, s.D_BIAS] = bias_free * ca.SX.eye(3)
+    allowed[s.D_VELOCITY_WANDER, s.D_VELOCITY_WANDER] = wander_free * ca.SX.eye(3)
     return allowed
 
 
@@ -247,14 +244,14 @@ def compiled_extrapolation() -> ca.Function:
 
 @lru_cache(maxsize=1)
 def extrapolation() -> ca.Function:
-    """(nominal core (16,) or longer, inputs (PREDICTION_INPUTS or longer)) -> nominal core after IN_DT."""
+    """(nominal core (22,) or longer, inputs (PREDICTION_INPUTS or longer)) -> nominal core after IN_DT."""
     core, inputs = ca.SX.sym("core", s.CORE_NOMINAL), ca.SX.sym("inputs", s.PREDICTION_INPUTS)
     return _function("extrapolation", [core, inputs], [es.normalised(es.predict_nominal(core, inputs))])
 
 
 @lru_cache(maxsize=1)
 def marker_geometry() -> ca.Function:
-    """(core, marker (7,), sighting (7,)) -> (innovation (6,), H by core (6, 15), H by marker (6, 6)) of eq. 7."""
+    """(core, marker (7,), sighting (7,)) -> (innovation (6,), H by core (6, 21), H by marker (6, 6)) of eq. 7."""
     core, marker, relative = ca.SX.sym("core", s.CORE_NOMINAL), ca.SX.sym("marker", 7), ca.SX.sym("relative", 7)
     innovation = me.marker_innovation(core, marker, relative)
     return _function("marker_geometry", [core, marker, relative], [innovation, *me.marker_jacobians(core, marker)])
@@ -262,7 +259,7 @@ def marker_geometry() -> ca.Function:
 
 @lru_cache(maxsize=1)
 def marker_location() -> ca.Function:
-    """(core, sighting (7,)) -> (marker in the world (7,), its Jacobians by core (6, 15) and by sighting (6, 6))."""
+    """(core, sighting (7,)) -> (marker in the world (7,), its Jacobians by core (6, 21) and by sighting (6, 6))."""
     core, relative = ca.SX.sym("core", s.CORE_NOMINAL), ca.SX.sym("relative", 7)
     return _function(
         "marker_location", [core, relative], [me.locate_marker(core, relative), *me.locating_jacobians(core, relative)]

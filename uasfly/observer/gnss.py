@@ -21,6 +21,7 @@ DRIFT_WINDOW_S = 1.0
 SLOWEST_DRIFT_M_S = 0.35
 DRIFT_SIGMAS = 4.0  # of the random walk that GNSS is known to have, over the window
 LONGEST_ELAPSED_S = 0.2
+CONFIRMED_S = 0.1  # for so long it must go on: a single wrong position is no drift
 MEMORY_SAMPLES = 30.0  # samples that the filter's memory averages over; a wander does not average out
 
 Vector = tuple[float, float, float]
@@ -80,6 +81,7 @@ class DriftWatch:
         self._velocity = [0.0, 0.0, 0.0]
         self._way = (0.0, 0.0, 0.0)
         self.speed_m_s = 0.0
+        self._runs_since_s = math.inf
 
     def look(self, odometry: Odometry, verdicts: tuple[Verdict, ...]) -> None:
         """A sample, and what the gates said of it; a velocity that is refused proves nothing."""
@@ -94,6 +96,7 @@ class DriftWatch:
         elif odometry.time_s - self._agreed_s > LONGEST_ELAPSED_S:
             self._past.clear()
             self.speed_m_s = 0.0
+            self._runs_since_s = math.inf
         if agrees and odometry.use[s.VELOCITY_SENSOR]:
             self._velocity = odometry.velocity
         vx, vy, vz = self._velocity
@@ -108,8 +111,12 @@ class DriftWatch:
         while past[0][0] < odometry.time_s - DRIFT_WINDOW_S:
             past.popleft()
         self.speed_m_s = math.dist(now, past[0][1]) / DRIFT_WINDOW_S
+        if self.speed_m_s <= self._limit_m_s:
+            self._runs_since_s = math.inf
+        elif self._runs_since_s == math.inf:
+            self._runs_since_s = odometry.time_s
 
     @property
     def runs_away(self) -> bool:
         """Whether GNSS is not to be followed."""
-        return self.speed_m_s > self._limit_m_s
+        return self._time_s - self._runs_since_s >= CONFIRMED_S

@@ -7,10 +7,9 @@ import casadi as ca
 from uasfly.model import quaternion_product, rotation_from_quaternion
 from uasfly.observer import states as s
 from uasfly.observer.error_state import (
-    along_manifold,
     at_zero,
     conjugate,
-    difference_between,
+    exponential,
     logarithm,
     pose_difference,
     retract,
@@ -29,21 +28,26 @@ def measure_velocity(core: ca.SX) -> ca.SX:
     Eq. 6 has y2 = R' v, for a sensor on the body. PX4's velocity is its filter's, kept and corrected by GNSS in world
     axes: turning it into the body with the measured attitude would only add that attitude's error, correlated with y1b.
     """
-    return core[s.VELOCITY]
+    return core[s.VELOCITY] + core[s.VELOCITY_WANDER]
+
+
+def measure_attitude(core: ca.SX) -> ca.SX:
+    """Attitude (4,) as PX4 gives it: y1b = q of eq. 6, turned by its slow error."""
+    return quaternion_product(core[s.QUATERNION], exponential(core[s.ATTITUDE_WANDER]))
 
 
 def attitude_innovation(core: ca.SX, measured: ca.SX) -> ca.SX:
-    """Innovation (3,) [rad] of a measured quaternion: log(q^-1 y1b), body axes (eq. 6)."""
-    return logarithm(quaternion_product(conjugate(core[s.QUATERNION]), measured))
+    """Innovation (3,) [rad] of a measured quaternion: the turn that leads to it from the expected one, body axes."""
+    return logarithm(quaternion_product(conjugate(measure_attitude(core)), measured))
 
 
 def odometry_jacobian(core: ca.SX, sensor: int) -> ca.SX:
-    """Derivative (3, 15) of a sensor's measurement with respect to the error; `sensor` indexes SENSORS."""
-    if sensor == s.ATTITUDE_SENSOR:
-        return along_manifold(lambda start, error: difference_between(start, retract(start, error)), core)[
-            s.D_ATTITUDE, :
-        ]
+    """Derivative (3, 21) of a sensor's measurement with respect to the error; `sensor` indexes SENSORS."""
     error = ca.SX.sym("error", s.CORE_ERROR)
+    if sensor == s.ATTITUDE_SENSOR:  # the same at every attitude: taken at the identity it comes out short
+        level = ca.vertcat(core[: s.QUATERNION.start], 1, 0, 0, 0, core[s.QUATERNION.stop :])
+        turn = quaternion_product(conjugate(measure_attitude(level)), measure_attitude(retract(level, error)))
+        return at_zero(2.0 * turn[1:], error)
     moved = retract(core, error)
     return at_zero(measure_position(moved) if sensor == s.POSITION_SENSOR else measure_velocity(moved), error)
 
@@ -74,7 +78,7 @@ def marker_innovation(core: ca.SX, marker: ca.SX, relative: ca.SX) -> ca.SX:
 
 
 def marker_jacobians(core: ca.SX, marker: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Derivatives (6, 15) and (6, 6) of eq. 7 with respect to the core's and to the marker's error."""
+    """Derivatives (6, 21) and (6, 6) of eq. 7 with respect to the core's and to the marker's error."""
     core_error, marker_error = ca.SX.sym("core_error", s.CORE_ERROR), ca.SX.sym("marker_error", s.MARKER_ERROR)
     expected = measure_marker(core, marker)
     by_core = pose_difference(expected, measure_marker(retract(core, core_error), marker))
@@ -83,7 +87,7 @@ def marker_jacobians(core: ca.SX, marker: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def locating_jacobians(core: ca.SX, relative: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Derivatives (6, 15) and (6, 6) of `locate_marker` with respect to the core's error and to the sighting's."""
+    """Derivatives (6, 21) and (6, 6) of `locate_marker` with respect to the core's error and to the sighting's."""
     core_error, noise = ca.SX.sym("core_error", s.CORE_ERROR), ca.SX.sym("noise", s.MARKER_ERROR)
     located = locate_marker(core, relative)
     by_core = pose_difference(located, locate_marker(retract(core, core_error), relative))

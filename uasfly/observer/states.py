@@ -1,6 +1,8 @@
 """What the filter's vectors hold: nominal state, error state, and the packed vectors of the generated functions.
 
-The nominal state is Kalaitzakis & Vitzilaios 2023, section 2.3: p v q F b and one pose p_M q_M a marker.
+The nominal state is Kalaitzakis & Vitzilaios 2023, section 2.3: p v q F b and one pose p_M q_M a marker, and beyond it
+the slow errors of PX4's own velocity and attitude (its filter's output, not a sensor's: they forget themselves within
+seconds, and taken for white noise they would make this filter surer than it is).
 The error is local (body side) in every rotation: q = q_nominal * exp(d_attitude); the other parts add up.
 """
 
@@ -14,7 +16,9 @@ VELOCITY = slice(3, 6)  # m/s, world
 QUATERNION = slice(6, 10)  # body to world
 FORCE = slice(10, 13)  # m/s^2, world, mass-normalised
 BIAS = slice(13, 16)  # m, world: measured minus true position
-CORE_NOMINAL = 16
+VELOCITY_WANDER = slice(16, 19)  # m/s, world: measured minus true velocity, without the white noise
+ATTITUDE_WANDER = slice(19, 22)  # rad, body: turn from the true to the measured attitude, without the white noise
+CORE_NOMINAL = 22
 MARKER_NOMINAL = 7  # p_M (m, world), q_M (marker to world)
 
 # Error state.
@@ -23,7 +27,9 @@ D_VELOCITY = slice(3, 6)  # m/s
 D_ATTITUDE = slice(6, 9)  # rad, body
 D_FORCE = slice(9, 12)  # m/s^2
 D_BIAS = slice(12, 15)  # m
-CORE_ERROR = 15
+D_VELOCITY_WANDER = slice(15, 18)  # m/s
+D_ATTITUDE_WANDER = slice(18, 21)  # rad
+CORE_ERROR = 21
 MARKER_ERROR = 6  # position (m, world), rotation (rad, marker frame)
 
 # Sensors inside an odometry sample, in the order in which they are used; each has three degrees of freedom.
@@ -86,25 +92,28 @@ IN_FORCE_DENSITY = 7  # m^2/s^4/s
 IN_ACCELERATION_DENSITY = 8  # m^2/s^4/Hz
 IN_ATTITUDE_DENSITY = 9  # rad^2/s^2/Hz
 IN_DRAG = slice(10, 13)  # 1/s
-IN_WANDER_DENSITY = 13  # m^2/s, of the position: while a marker shows it that the measured velocity is wrong
-PREDICTION_INPUTS = 14
+IN_WANDER_RATE = 13  # 1/s, at which the wanders forget themselves
+IN_VELOCITY_WANDER_DENSITY = 14  # m^2/s^2/s
+IN_ATTITUDE_WANDER_DENSITY = 15  # rad^2/s
+PREDICTION_INPUTS = 16
 IN_MOTION = slice(0, 10)  # all but the drag
 
 # Further input of an odometry step.
-IN_QUATERNION = slice(14, 18)  # measured, body to world
-IN_POSITION = slice(18, 21)  # m, measured
-IN_VELOCITY = slice(21, 24)  # m/s, measured, world
-IN_USE = slice(24, 27)  # 1 = the sensor has something to say, in the order of SENSORS
-IN_CORRELATION = slice(27, 30)  # factor on the variance for the correlation in time, in the order of SENSORS
-IN_VARIANCE = slice(30, 33)  # configured variances (rad^2, m^2, m^2/s^2)
-IN_INTERVAL = 33  # s since the sample before
-IN_MATCHING_WEIGHT = 34  # 0..1, weight of this innovation in the matched covariance
-IN_MEAN_WEIGHT = 35  # 0..1, weight of this innovation in the mean innovation
-IN_BIAS_FREE = 36  # 1 while a marker makes the GNSS bias observable, else 0
-IN_AGREES = 37  # 1 while measured position and velocity tell the same motion, else 0
-ODOMETRY_INPUTS = 38
-IN_MEASURED = slice(14, 30)  # quaternion, position, velocity, use, correlation
-IN_WEIGHTS = slice(33, 38)  # interval, matching weight, mean weight, bias free, agrees
+IN_QUATERNION = slice(16, 20)  # measured, body to world
+IN_POSITION = slice(20, 23)  # m, measured
+IN_VELOCITY = slice(23, 26)  # m/s, measured, world
+IN_USE = slice(26, 29)  # 1 = the sensor has something to say, in the order of SENSORS
+IN_CORRELATION = slice(29, 32)  # factor on the variance for the correlation in time, in the order of SENSORS
+IN_VARIANCE = slice(32, 35)  # configured variances (rad^2, m^2, m^2/s^2)
+IN_INTERVAL = 35  # s since the sample before
+IN_MATCHING_WEIGHT = 36  # 0..1, weight of this innovation in the matched covariance
+IN_MEAN_WEIGHT = 37  # 0..1, weight of this innovation in the mean innovation
+IN_BIAS_FREE = 38  # 1 while the GNSS bias may change: a marker makes it observable, or GNSS runs away; else 0
+IN_WANDER_FREE = 39  # 1 while a marker makes the velocity's wander observable, else 0
+IN_AGREES = 40  # 1 while measured position and velocity tell the same motion, else 0
+ODOMETRY_INPUTS = 41
+IN_MEASURED = slice(16, 32)  # quaternion, position, velocity, use, correlation
+IN_WEIGHTS = slice(35, 41)  # interval, matching weight, mean weight, bias free, wander free, agrees
 
 # Output of an odometry step beside the new packed state.
 OUT_NIS = slice(0, 3)  # normalised innovation squared

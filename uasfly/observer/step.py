@@ -28,10 +28,8 @@ INITIAL_FORCE_SIGMA = 1.0  # m/s^2, before anything is known of the wind (P0 of 
 # For this long after an accepted sighting the GNSS bias counts as observable: nothing but time makes position and bias
 # less known, the velocity's integral beside the position with its bias tells how they part.
 MARKER_FRESH_S = 20.0
-WANDER_TIME_S = 4.0  # in which an error of PX4's velocity forgets itself (its own simulator)
-LEAST_AGE_S = 0.2  # of a sighting: with fewer the filter would take the velocity's errors for the marker's
 MEAN_TIME_S = 0.25  # time constant of the mean innovation that tells a jump from noise
-RUNAWAY_FACTOR = 100.0  # on the variance of the GNSS bias's walk, while GNSS runs away
+RUNAWAY_DENSITY = 0.5  # m/sqrt(s), walk of the GNSS bias while GNSS runs away
 _NO_RATE = (0.0, 0.0, 0.0)
 SHORTEST_INTERVAL_S = 1e-3  # between samples
 LONGEST_INTERVAL_S = 0.1  # a sample after a pause weighs no more in the matching than after this
@@ -60,6 +58,9 @@ class Stepper:
         )
         self._inputs = np.zeros(s.ODOMETRY_INPUTS)
         self._inputs[s.IN_DRAG] = airframe.model.drag_1_s
+        self._inputs[s.IN_WANDER_RATE] = 1.0 / noise.wander_time_s
+        self._inputs[s.IN_VELOCITY_WANDER_DENSITY] = 2.0 * noise.velocity_wander_m_s**2 / noise.wander_time_s
+        self._inputs[s.IN_ATTITUDE_WANDER_DENSITY] = 2.0 * noise.attitude_wander_rad**2 / noise.wander_time_s
         self._inputs[s.IN_VARIANCE] = (
             noise.attitude_sigma_rad**2,
             noise.position_sigma_m**2,
@@ -86,7 +87,7 @@ class Stepper:
             self._odometry_steps[markers] = functions.Caller(update)
 
     def start(self, odometry: Odometry, airborne: bool) -> Moment:
-        """The first moment, from a complete odometry sample: force and GNSS bias zero.
+        """The first moment, from a complete odometry sample: force, GNSS bias and wanders zero.
 
         The bias starts as exactly zero: the world frame is PX4's local frame as it lies at this moment, and the bias is
         how far GNSS has drifted since.
@@ -102,7 +103,17 @@ class Stepper:
         diagonal[s.D_VELOCITY] = variances[s.VELOCITY_SENSOR]
         diagonal[s.D_ATTITUDE] = variances[s.ATTITUDE_SENSOR]
         diagonal[s.D_FORCE] = INITIAL_FORCE_SIGMA**2
-        packed[layout.covariance] = np.diag(diagonal).ravel()
+        P = np.diag(diagonal)
+        wanders = (
+            (s.D_VELOCITY, s.D_VELOCITY_WANDER, self._noise.velocity_wander_m_s),
+            (s.D_ATTITUDE, s.D_ATTITUDE_WANDER, self._noise.attitude_wander_rad),
+        )
+        for true, wander, sigma in wanders:  # what is measured is the sum of the two
+            shared = sigma**2 * np.eye(3)
+            P[true, true] += shared
+            P[wander, wander] = shared
+            P[true, wander] = P[wander, true] = -shared
+        packed[layout.covariance] = P.ravel()
         packed[layout.matched] = np.concatenate([np.eye(3).ravel() * variance for variance in variances])
         rate, time_s = tuple(odometry.rate or (0.0, 0.0, 0.0)), odometry.time_s
         return Moment(time_s, packed, (), (), airborne, rate, time_s, time_s, (), odometry)
@@ -119,7 +130,7 @@ class Stepper:
         return self._sighting(moved, measured) if measured else (moved, ())
 
     def extrapolated(self, moment: Moment, time_s: float) -> Array:
-        """Nominal core state (16,) at `time_s` >= `moment.time_s`, by the model alone."""
+        """Nominal core state (22,) at `time_s` >= `moment.time_s`, by the model alone."""
         result = np.empty(s.CORE_NOMINAL)
         self._prepare_prediction(moment, moment.time_s, time_s, moment.rate)
         self._extrapolation((moment.packed, self._inputs), (result,))
@@ -133,26 +144,11 @@ class Stepper:
             self._thrust.mean(start_s, end_s),
             *(rate if known else _NO_RATE),
             moment.airborne,
-            (RUNAWAY_FACTOR if self.bias_free else 1.0) * noise.gnss_bias_density**2,
+            max(noise.gnss_bias_density, RUNAWAY_DENSITY if self.bias_free else 0.0) ** 2,
             noise.force_density**2 if moment.airborne else 0.0,
             noise.acceleration_density**2 if moment.airborne else GROUND_ACCELERATION_DENSITY**2,
             noise.attitude_density**2 if known else UNKNOWN_TURN_DENSITY**2,
         )
-        self._inputs[s.IN_WANDER_DENSITY] = self._wander_variance(moment, end_s) if moment.airborne else 0.0
-
-    def _wander_variance(self, moment: Moment, time_s: float) -> float:
-        """Density [m^2/s] with which the velocity's integral walks away from a marker that was just seen; 0 without.
-
-        An error of the velocity of variance c that forgets itself in tau makes the integral's variance grow with
-        2 c tau (1 - exp(-t / tau)) at the time t since the last sighting: slowly first, as a random walk in the end.
-        """
-        if not moment.sighted_s:
-            return 0.0
-        age_s = time_s - max(moment.sighted_s)
-        if age_s >= MARKER_FRESH_S:
-            return 0.0
-        grown = 1.0 - math.exp(-max(age_s, LEAST_AGE_S) / WANDER_TIME_S)
-        return self._noise.velocity_wander_density**2 * grown
 
     @staticmethod
     def _sees_a_marker(moment: Moment, time_s: float) -> bool:
@@ -182,7 +178,7 @@ class Stepper:
         self._prepare_prediction(before, last_s, time_s, rate)
         interval_s = max(time_s - before.odometry_s, SHORTEST_INTERVAL_S)
         counted_s = min(interval_s, LONGEST_INTERVAL_S)
-        bias_free = self.bias_free or self._sees_a_marker(before, time_s)
+        sees_a_marker = self._sees_a_marker(before, time_s)
         inputs[s.IN_MEASURED] = (
             *odometry.quaternion,
             *odometry.position,
@@ -194,7 +190,8 @@ class Stepper:
             counted_s,
             self._matching_weight(counted_s),
             1.0 - math.exp(-counted_s / MEAN_TIME_S),
-            bias_free,
+            self.bias_free or sees_a_marker,
+            sees_a_marker,
             self.agrees,
         )
         result = np.empty(packed.size)

@@ -13,6 +13,7 @@ from uasfly.reproduce.rows import Progress, Reproduction
 
 PAPERS: Mapping[str, str] = {
     "asignacion2022": "Asignacion et al., Frequency-Based Wind Gust Estimation for Quadrotors, RA-L 7(4)",
+    "kalaitzakis2023": "Kalaitzakis & Vitzilaios, UAS Control under GNSS Degraded and Windy Conditions, Robotics 12(5)",
     "waslander2009": "Waslander & Wang, Wind Disturbance Estimation and Rejection for Quadrotor Position Control, AIAA",
 }
 

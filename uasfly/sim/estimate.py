@@ -215,8 +215,9 @@ class Estimate:
     def _renew_position(self, now: float) -> None:
         period = 1.0 / self._sensors.position_rate_hz
         self._next_position_s = max(self._next_position_s + period, now)
-        if self._sensors.gnss is not None:
-            walk = self._sensors.gnss.random_walk_m_sqrt_s * math.sqrt(period)
+        gnss = self._sensors.gnss
+        if gnss is not None and now >= gnss.walk_from_s:
+            walk = gnss.random_walk_m_sqrt_s * math.sqrt(period)
             self._bias = [b + walk * n for b, n in zip(self._bias, self._noise.row[_WALK], strict=True)]
         white, noise = self._sensors.position_white_sigma_m, self._noise.row[_POSITION]
         self._held = [b + white * n + offset for b, n, offset in zip(self._bias, noise, self.gnss_offset, strict=True)]

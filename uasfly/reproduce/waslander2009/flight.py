@@ -11,10 +11,10 @@ import numpy as np
 from uasfly.airframe import Airframe
 from uasfly.control.controller import Controller, ControlResult, NmpcController, PidController, PidDdController
 from uasfly.control.protocol import ReferenceAt
+from uasfly.drivers.simulated_flight import SimulatedFlight
 from uasfly.errors import UasflyError
 from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot
-from uasfly.link.in_process import InProcessLink
 from uasfly.messages import Array, Phase, Setpoint, StateEstimate
 from uasfly.mission import Mission
 from uasfly.observer.observer import Observer
@@ -161,34 +161,18 @@ def fly(plan: PaperFlight) -> Record:
         for number, (name, make) in enumerate(plan.onboard.items())
     }
     vehicle.watcher = _Aboard(vehicle, tuple(onboard.values()))
-    settings = plan.scenario.link
-    link = InProcessLink(
-        vehicle,
-        settings.telemetry_latency_s,
-        settings.command_latency_s,
-        settings.jitter_s,
-        np.random.default_rng([plan.seed, 7]),
-    )
     chosen = None if plan.flies_by is None else onboard[plan.flies_by]
     controller = make_controller(plan.controller, plan.airframe, chosen)
     flown: Controller = controller if chosen is None else _Fed(controller, chosen, moves_by=plan.moves_by)
     pilot = Pilot(plan.airframe, plan.mission, Observer(plan.airframe, 0), flown, Engage.AUTO)
-    period_s = 1.0 / plan.airframe.controller.rate_hz
-    link.advance_to(STANDS_S)
-    link.poll()
+    rate_hz = plan.airframe.controller.rate_hz
+    flight = SimulatedFlight(vehicle, plan.scenario.link, pilot, rate_hz, plan.seed, begins_s=STANDS_S)
     log = _Log(onboard)
-    for cycle in range(1, round(LONGEST_S / period_s)):
-        now_s = STANDS_S + cycle * period_s
-        link.advance_to(now_s)
-        truth = link.truth()
-        result = pilot.step(now_s, link.poll())
-        if result.setpoint is not None:
-            link.send(result.setpoint)
-        for request in result.requests:
-            link.request(request)
-        status = result.status
+    while not flight.lasted(LONGEST_S):
+        cycle = flight.cycle()
+        status, truth = cycle.result.status, cycle.truth
         if status.phase is Phase.LEGS and status.leg_started and status.reference_position_in_world is not None:
-            log.add(now_s, truth.position_in_world, status.reference_position_in_world)
+            log.add(cycle.now_s, truth.position_in_world, status.reference_position_in_world)
             log.air(truth.quaternion_body_to_world, truth.wind_in_world)
         elif log.times or pilot.done:
             break

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from uasfly.plotting import quiet_figure, save
+from uasfly.plotting import legend_below, quiet_figure, save
 from uasfly.reproduce.waslander2009.flight import Record
 
 _COLOURS = ("#c23b3b", "#e0762a", "#2f6fd0", "#2f9e5a")
@@ -24,7 +23,7 @@ def positions(flights: Mapping[str, Record], path: Path) -> None:
             panel.plot(record.time_s, record.error[:, axis], color=colour, label=title, linewidth=1.2)
         panel.set_ylabel(f"{'xyz'[axis]} [m]")
     panels[0].set_title("Hover in the paper's wind: true position minus (0, 0, 2)")
-    _legend(figure, panels[0])
+    legend_below(figure, panels[0])
     panels[-1].set_xlabel("time [s]")
     save(figure, path)
 
@@ -41,7 +40,7 @@ def winds(record: Record, sensors: str, path: Path) -> None:
             panel.plot(record.time_s, estimate, color=colour, linewidth=1.2, label=title)
         panel.set_ylabel(f"{'xyz'[axis]} [m/s]")
     panels[0].set_title("Wind at the vehicle, from accelerometers")
-    _legend(figure, panels[0])
+    legend_below(figure, panels[0])
     panels[-1].set_xlabel("time [s]")
     save(figure, path)
 
@@ -58,11 +57,5 @@ def paths(flights: Mapping[str, Record], path: Path) -> None:
         panel.set_aspect("equal")
     panel.set_xlabel("x [m]")
     panel.set_ylabel("y [m]")
-    _legend(figure, panel)
+    legend_below(figure, panel)
     save(figure, path)
-
-
-def _legend(figure: Any, panel: Any) -> None:
-    """Below the panels, where it hides nothing."""
-    handles, labels = panel.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
