@@ -169,8 +169,9 @@ def _held(bias_free: ca.SX, wander_free: ca.SX, layout: s.Layout) -> ca.SX:
 def _is_motion(inputs: ca.SX, sensor: int, markers: int) -> ca.SX:
     """1 where what a sensor says against the model is the vehicle's motion, not the sensor's error.
 
-    Position and velocity vouch for each other (see `agreement`); a velocity without a position is believed. While a
-    marker is seen it says where the vehicle is, and a measured position that says something else is wrong.
+    Position and velocity vouch for each other (see `agreement`); a velocity without a position is believed, and one
+    beside a position that is known to be wrong: GNSS runs away, or a marker says where the vehicle is instead. On the
+    ground the model has nothing to say against it.
     """
     match sensor:
         case s.POSITION_SENSOR if markers:
@@ -178,7 +179,8 @@ def _is_motion(inputs: ca.SX, sensor: int, markers: int) -> ca.SX:
         case s.POSITION_SENSOR:
             return inputs[s.IN_AGREES]
         case s.VELOCITY_SENSOR:
-            return ca.fmax(inputs[s.IN_AGREES], 1.0 - inputs[s.IN_USE][s.POSITION_SENSOR])
+            alone = ca.fmax(1.0 - inputs[s.IN_USE][s.POSITION_SENSOR], inputs[s.IN_BIAS_FREE])
+            return ca.fmax(ca.fmax(inputs[s.IN_AGREES], alone), 1.0 - inputs[s.IN_AIRBORNE])
         case _:
             return ca.SX(1.0)
 

@@ -15,6 +15,7 @@ from uasfly.marker_prediction import MarkerPrediction
 from uasfly.messages import (
     Array,
     AttitudeTargetSample,
+    FlightMode,
     HealthSample,
     MarkerSample,
     OdometrySample,
@@ -25,6 +26,7 @@ from uasfly.messages import (
 )
 from uasfly.observer import states as s
 from uasfly.observer.agreement import Agreement
+from uasfly.observer.contact import GroundContact
 from uasfly.observer.diagnosis import Diagnosis, Journal
 from uasfly.observer.door import Odometry, Sighting, checked_odometry, checked_sighting
 from uasfly.observer.expected import expected_marker
@@ -43,6 +45,7 @@ LONGEST_GAP_S = 5.0  # a longer gap is not bridged: the filter starts again
 EXPECTED_WITHIN_S = 0.5  # of where the filter stands: beyond it nothing is said about where a marker is to be seen
 GLIDE_AFTER_S, GLIDE_FOR_S = 1.0, 5.0  # without a sighting for so long, what the next ones correct is told gradually
 MOVED_AFTER, MOVED_M = 5, 0.15  # so many sightings refused in a row, that far away: the marker has been moved
+THRUST_SHOWS_S = 0.05  # in the velocity, over so long: for what carries the vehicle
 RESTART_AFTER_S = 1.0  # samples that are all too old for this long: the clock was set back, start again
 
 
@@ -97,6 +100,7 @@ class Observer:
         self._drift = DriftWatch(airframe.observer.gnss_bias_density)
         self._agreement = Agreement()
         self._glide = Glide()
+        self._contact = GroundContact()
         self._regained_s = -math.inf
         self._moved: list[tuple[int, float]] = []
         self._refused: dict[int, int] = {}
@@ -115,6 +119,7 @@ class Observer:
             if odometry is None or not odometry.complete:
                 self.counters.non_finite += 1
             if odometry is not None:
+                self._look_for_contact(odometry)
                 self._measure(self._outage.usable(odometry) if self._in_air and self._outage.active else odometry)
         elif isinstance(sample, MarkerSample):
             sighting = checked_sighting(sample)
@@ -128,10 +133,7 @@ class Observer:
         elif isinstance(sample, HealthSample):
             self._outage.hear(sample)
         elif isinstance(sample, VehicleSample):
-            if not math.isfinite(sample.time_s):
-                self.counters.non_finite += 1
-            elif sample.time_s >= self._in_air_s:
-                self._in_air, self._in_air_s = sample.in_air, sample.time_s
+            self._hear(sample)
 
     def sent(self, setpoint: Setpoint, in_offboard: bool) -> None:
         """A setpoint left at its `time_s`; it drives the model only while PX4 follows it (`in_offboard`)."""
@@ -156,8 +158,8 @@ class Observer:
             return None
         if time_s - timeline.newest.odometry_s > SILENT_AFTER_S:
             if time_s - timeline.newest.time_s > SILENT_AFTER_S:
-                timeline.append(time_s - TICK_BEHIND_S, None, self._in_air)
-            moment, _ = self._stepper.advance(timeline.newest, time_s, None, self._in_air)
+                timeline.append(time_s - TICK_BEHIND_S, None, self._flies)
+            moment, _ = self._stepper.advance(timeline.newest, time_s, None, self._flies)
             core = moment.packed[: s.CORE_NOMINAL].copy()
         else:
             moment = timeline.at(time_s)
@@ -244,6 +246,23 @@ class Observer:
             raise LookupError("the observer has no covariance before the first odometry sample")
         return moment.packed[moment.layout.covariance].reshape(moment.layout.errors, -1).copy()
 
+    def _hear(self, vehicle: VehicleSample) -> None:
+        if not math.isfinite(vehicle.time_s):
+            self.counters.non_finite += 1
+        elif vehicle.time_s >= self._in_air_s:
+            self._in_air, self._in_air_s = vehicle.in_air, vehicle.time_s
+            if vehicle.mode is not FlightMode.OFFBOARD:
+                self._own_command_s = -math.inf  # PX4 flies by its own target now
+
+    @property
+    def _flies(self) -> bool:
+        return self._in_air and not self._contact.stands
+
+    def _look_for_contact(self, odometry: Odometry) -> None:
+        if self._in_air and odometry.use[s.VELOCITY_SENSOR]:
+            thrust_m_s2 = self._thrust.mean(odometry.time_s - THRUST_SHOWS_S, odometry.time_s)
+            self._contact.look(odometry.time_s, odometry.velocity[2], thrust_m_s2)
+
     def _command(self, time_s: float, thrust: float) -> bool:
         if not (math.isfinite(time_s) and math.isfinite(thrust)):
             self.counters.non_finite += 1
@@ -274,7 +293,7 @@ class Observer:
             elif time_s >= newest_s:
                 self._agreement.look(measured, timeline.newest.position_sigma_m)
                 self._stepper.agrees = self._agreement.agrees
-                verdicts = timeline.append(time_s, measured, self._in_air)
+                verdicts = timeline.append(time_s, measured, self._flies)
                 self._note(measured, verdicts)
                 self._drift.look(measured, verdicts)
                 self._stepper.bias_free = self._drift.runs_away
@@ -287,7 +306,7 @@ class Observer:
         """A sighting, mostly late; the first after a while may move the filter, and what is told then glides there."""
         before = timeline.newest
         if sighting.time_s >= before.time_s:
-            verdicts = timeline.append(sighting.time_s, sighting, self._in_air)
+            verdicts = timeline.append(sighting.time_s, sighting, self._flies)
         else:
             self.counters.late += 1
             verdicts = timeline.insert(sighting)
@@ -327,7 +346,7 @@ class Observer:
 
     def _start(self, measured: Odometry | Sighting) -> None:
         if isinstance(measured, Odometry) and measured.complete:
-            self._timeline = Timeline(self._stepper, self._stepper.start(measured, self._in_air))
+            self._timeline = Timeline(self._stepper, self._stepper.start(measured, self._flies))
             self._ahead_s = self._dropped_from_s = None
 
     def _restart(self, measured: Odometry | Sighting) -> None:
