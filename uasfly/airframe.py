@@ -167,6 +167,23 @@ class Battery(FileModel):
     thrust_exponent: Annotated[float, Field(ge=0.0, le=3.0)]
 
 
+class WindSettings(FileModel):
+    """What the wind's speed is told by: the drag against the airspeed, as identified (see `uasfly.identify.drag`)."""
+
+    drag_1_s: Annotated[
+        float, Field(ge=1e-3, le=100.0, description="linear part: acceleration over airspeed, horizontal")
+    ]
+    drag_1_m: Annotated[
+        float, Field(ge=0.0, le=100.0, description="quadratic part: acceleration over squared airspeed")
+    ]
+    drag_sigma_share: Annotated[
+        float, Field(gt=0.0, le=1.0, description="standard deviation of the drag at a given airspeed, relative")
+    ]
+    tilt_sigma_rad: Annotated[
+        float, Field(gt=0.0, le=0.1, description="standard deviation of PX4's roll and pitch over seconds")
+    ] = 0.003
+
+
 class Airframe(FileModel):
     """One vehicle as uasfly knows it."""
 
@@ -182,6 +199,9 @@ class Airframe(FileModel):
     backup: Backup
     observer: ObserverNoise
     battery: Battery
+    wind: Annotated[
+        WindSettings | None, Field(description="without it the model's linear drag, which is far less certain")
+    ] = None
 
     @model_validator(mode="after")
     def _thrust_range_holds_hover(self) -> Airframe:

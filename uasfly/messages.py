@@ -9,24 +9,11 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass, field
-from typing import TypeVar, dataclass_transform
+from dataclasses import field
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
-Message = TypeVar("Message")
-
-
-@dataclass_transform(frozen_default=True, field_specifiers=(field,))
-def message(kind: type[Message]) -> type[Message]:
-    """A dataclass with slots that nobody changes once it is made: the type checker sees to it.
-
-    With frozen=True the interpreter would see to it too, at more than twice the steps to make one, and a control cycle
-    makes a dozen.
-    """
-    return dataclass(slots=True, unsafe_hash=True)(kind)
+from uasfly.message_class import Array as Array
+from uasfly.message_class import message
+from uasfly.wind_messages import WindEstimate
 
 
 class FlightMode(enum.Enum):
@@ -381,6 +368,7 @@ class Status:
         pilot_flies: the mission waits, because somebody else has the vehicle until it is switched to offboard.
         marker_age_s: of the last sighting of the marker that the mission hangs on; NaN without one.
         waits_for: what the vehicle waits for, in offboard, before the legs can begin; "" for nothing.
+        wind: None on the ground, and until it is known.
     """
 
     time_s: float
@@ -405,3 +393,4 @@ class Status:
     pilot_flies: bool = False
     marker_age_s: float = math.nan
     waits_for: str = ""
+    wind: WindEstimate | None = None

@@ -6,11 +6,13 @@ import io
 import math
 import re
 from collections import Counter
+from typing import Any
 
 import pytest
 from rich.console import Console
 
 from tests.cli.scenes import estimate, not_finite, scene, status, unknown
+from tests.winds import wind_estimate
 from uasfly.cli.big_text import big
 from uasfly.cli.dashboard import Dashboard, draw
 from uasfly.cli.gauges import bar, large_arrow, small_arrow
@@ -72,8 +74,31 @@ def test_every_value_is_there() -> None:
     assert "…" not in text
 
 
+def windy(**changes: Any) -> Status:
+    """The wind is known."""
+    return status(wind=wind_estimate(**changes))
+
+
+def test_the_wind_is_told_as_pilots_say_it() -> None:
+    """Speed in large digits, where it comes from, gusts; the arrow points where it pushes; one line in a small view."""
+    text = _text(scene(windy()))
+    for words in ("─ wind ─", "m/s from 59°", "gusts 9.2 m/s", *big("5.8")):
+        assert words in text, words
+    assert "wind      ↙ 5.8 m/s from 59°, gusts 9.2" in _text(scene(windy()), 50, 12)
+
+
+def test_a_wind_that_is_not_known_is_said_to_be_unknown() -> None:
+    """Its force is told then; and a wind weaker than its sigma comes from nowhere."""
+    assert "wind unknown, its force" in _text(scene(status()))
+    calm = _text(scene(windy(mean_speed_m_s=0.1, mean_from_deg=math.nan)))
+    assert "from" not in calm
+    assert "wind      · 0.1 m/s, gusts 9.2" in _text(scene(windy(mean_speed_m_s=0.1, mean_from_deg=math.nan)), 50, 12)
+
+
 @pytest.mark.parametrize(("width", "height"), SIZES)
-@pytest.mark.parametrize("of", [status(), unknown(), not_finite(math.nan), not_finite(math.inf), not_finite(-math.inf)])
+@pytest.mark.parametrize(
+    "of", [status(), windy(), unknown(), not_finite(math.nan), not_finite(math.inf), not_finite(-math.inf)]
+)
 def test_it_fits_every_terminal_whatever_is_known(of: Status, width: int, height: int) -> None:
     """No row is wider and there are no more of them than the terminal has."""
     long = Note(1.0, 3, "the vehicle left offboard for position: the pilot, or a failsafe of PX4, has it " * 3)

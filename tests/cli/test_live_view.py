@@ -49,14 +49,14 @@ def _console(screen: Screen, terminal: bool) -> Console:
 
 
 def test_without_a_terminal_there_are_plain_lines_now_and_then() -> None:
-    """A line every five seconds with phase, progress, position, error and force; nothing is redrawn."""
+    """A line every five seconds with phase, progress, position, error, force and wind; nothing is redrawn."""
     screen = Screen()
     with LiveView("hover", "f550", _console(screen, terminal=False)) as view:
         for k in range(601):
             view.update(status(0.02 * k), CYCLE)
     lines = screen.getvalue().splitlines()
     assert len(lines) == 3
-    for word in ("legs", "25 %", "+1.00 -2.00 +1.50 m", "error 6.0 cm", "force +1.50 +0.00 -0.20 m/s²"):
+    for word in ("legs", "25 %", "+1.00 -2.00 +1.50 m", "error 6.0 cm", "force +1.50 +0.00 -0.20 m/s²", "wind unknown"):
         assert word in lines[0]
     assert "\x1b" not in screen.getvalue()
 

@@ -33,6 +33,7 @@ from uasfly.messages import (
     VehicleSample,
 )
 from uasfly.record.reader import LogReader
+from uasfly.wind_messages import WindEstimate
 
 CYCLES = 20  # in the legs, before something happens
 
@@ -49,6 +50,7 @@ class HoveringLink:
         self.mode = FlightMode.HOLD
         self.asked: list[RequestKind] = []
         self.setpoints_in_offboard = 0
+        self.winds: list[WindEstimate] = []
         self._answers: list[Sample] = []
 
     def poll(self) -> tuple[Sample, ...]:
@@ -67,6 +69,10 @@ class HoveringLink:
 
     def send_text(self, severity: int, text: str) -> None:
         """Nobody listens."""
+
+    def send_wind(self, wind: WindEstimate) -> None:
+        """Keep it."""
+        self.winds.append(wind)
 
     def send(self, setpoint: Setpoint) -> bool:
         """Count."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.winds import wind_estimate
 from uasfly.errors import FileError
 from uasfly.flight.summary import SummaryCollector, write_summary
 from uasfly.messages import Array, OdometrySample, Phase, Sample, StateEstimate, Status, TruthSample
@@ -223,3 +225,25 @@ def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     """The error says which file and why."""
     with pytest.raises(FileError, match=r"missing.*cannot be written.*No such file"):
         write_summary({}, tmp_path / "missing" / "summary.json")
+
+
+def test_the_wind_of_the_legs_is_in_the_summary() -> None:
+    """Mean, direction it comes from, strongest gust, least margin, and its error against the truth of its own time."""
+    summary = SummaryCollector()
+    winds = [wind_estimate(time_s=99.7, velocity_in_world=np.array((-4.0, 0.0)), gust_m_s=6.0, margin=0.2)]
+    winds.append(wind_estimate(time_s=100.7, velocity_in_world=np.array((-6.0, 0.0)), gust_m_s=8.0, margin=0.5))
+    truths = [
+        TruthSample(time_s + shift_s, ZERO, ZERO, LEVEL, ZERO, np.array((east + 10.0 * shift_s, 0.4, 0.0)))
+        for time_s, east in ((99.7, -4.3), (100.7, -6.3))
+        for shift_s in (-0.01, 0.02)
+    ]
+    for k in range(100):
+        now = 100.0 + PERIOD_S * k
+        status = replace(_status(now), wind=winds[now >= 101.0])
+        summary.cycle(
+            status, tuple(truth for truth in truths if now - 0.3 <= truth.time_s + 0.015 < now - 0.3 + 2.0 * PERIOD_S)
+        )
+    result = summary.result(wall_s=1.0, rejected={})["wind"]
+    assert (result["mean_m_s"], result["from_deg"], result["gust_m_s"], result["margin"]) == (5.0, 90.0, 8.0, 0.2)
+    assert result["error_rms_m_s"] == 0.5
+    assert SummaryCollector().result(wall_s=1.0, rejected={})["wind"] is None

@@ -12,6 +12,7 @@ import pytest
 from tests.link.fake_vehicle import FakeVehicle, mavlink
 from tests.link.waiting import Pair, arrived, texts, until
 from tests.link.wires import UdpWire, free_udp_port
+from tests.winds import wind_estimate
 from uasfly.errors import LinkError
 from uasfly.link.mavsdk_link import MavsdkLink
 from uasfly.link.protocol import VehicleLink
@@ -137,6 +138,18 @@ async def test_texts_go_both_ways(pair: Pair) -> None:
     assert first.text + second.text == "x" * 70
     assert first.id == second.id != 0
     assert (third.severity, third.text) == (2, "short")
+
+
+async def test_the_wind_goes_to_the_ground_station(pair: Pair) -> None:
+    """As WIND_COV of the companion computer: towards north and east, what is not known as NaN."""
+    link, vehicle = pair
+    link.send_wind(wind_estimate())
+    await arrived(lambda: vehicle.of_type("WIND_COV"))
+    (told,) = vehicle.of_type("WIND_COV")
+    assert (told.wind_x, told.wind_y, told.horiz_accuracy, told.var_horiz) == pytest.approx((-3.0, -5.0, 0.2, 1.1))
+    assert all(map(math.isnan, (told.wind_z, told.var_vert, told.wind_alt)))
+    assert told.vert_accuracy == 0.0
+    assert (told.get_srcSystem(), told.get_srcComponent()) == (7, 195)
 
 
 async def test_a_restart_of_the_vehicle_is_announced_and_set_up_again(pair: Pair) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.winds import wind_estimate
 from uasfly.errors import FileError
 from uasfly.messages import (
     FactsSample,
@@ -230,3 +231,14 @@ def test_a_file_that_is_no_log_is_refused(tmp_path: Path) -> None:
     path.write_text("hello")
     with pytest.raises(FileError, match="expected an MCAP flight log"):
         list(LogReader(path).messages())
+
+
+def test_the_wind_comes_back_with_its_unknown_direction() -> None:
+    """A status holds it; NaN survives, and so does that it is not known."""
+    calm = Status(1.0, Phase.LEGS, 0, True, 0.5, None, None, wind=wind_estimate(mean_from_deg=math.nan))
+    back = from_json(Status, to_json(calm))
+    assert np.isnan(back.wind.mean_from_deg)
+    np.testing.assert_array_equal(back.wind.covariance, wind_estimate().covariance)
+    np.testing.assert_array_equal(back.wind.mean_in_world, wind_estimate().mean_in_world)
+    assert back.wind.gust_m_s == wind_estimate().gust_m_s
+    assert from_json(Status, to_json(Status(1.0, Phase.LEGS, 0, True, 0.5, None, None))).wind is None

@@ -16,7 +16,7 @@ from uasfly.cli.gauges import bar, large_arrow, number, point_of_compass, small_
 from uasfly.cli.headline import PILOT, Headline, headline
 from uasfly.cli.readings import LABEL, clock, severity_style
 from uasfly.cli.scene import Scene
-from uasfly.messages import Phase
+from uasfly.messages import Phase, Status
 
 FULL_WIDTH, FULL_HEIGHT = 76, 22  # below, one line a value
 WIDE = 120  # from here on messages have a column of their own
@@ -61,7 +61,7 @@ def _full(scene: Scene, top: Headline, width: int) -> list[Row]:
         *_banner(scene, top, width),
         *beside(
             box("error", _error(scene), third),
-            box("wind force", _wind(scene), width - 2 * third),
+            _wind(scene, width - 2 * third),
             box("margin against wind", _margin(scene, third - 4), third),
         ),
         *beside(
@@ -107,13 +107,28 @@ def _error(scene: Scene) -> list[Row]:
     return [*_large(digits, unit, readings.error_colour(value)), *readings.sigmas(scene.status)]
 
 
-def _wind(scene: Scene) -> list[Row]:
-    east, north, up = readings.force(scene.status)
-    size = math.hypot(east, north)
-    digits = _large(number(size, ".2f" if size < 10.0 else ".1f"), "", "")
-    toward = row(("m/s² ", "bold"), point_of_compass(east, north))
-    texts = [*digits, toward, row(("up ", LABEL), f"{number(up, '+.2f')} m/s²")]
-    return [[*row((arrow, "bold"), "  "), *text] for arrow, text in zip(large_arrow(east, north), texts, strict=True)]
+def _wind(scene: Scene, width: int) -> list[Row]:
+    """Where the wind pushes, how strong it is and where it comes from; until that is known, its force."""
+    wind = scene.status.wind
+    if wind is not None:
+        title = "wind"
+        east, north = readings.pushes(wind)
+        lower = (
+            row(("m/s ", "bold"), readings.wind_from(wind)),
+            row(("gusts ", LABEL), f"{number(wind.gust_m_s, '.1f')} m/s"),
+        )
+        digits = _large(number(wind.mean_speed_m_s, ".1f"), "", "")
+    else:
+        title = "wind unknown, its force"
+        east, north, up = readings.force(scene.status)
+        size = math.hypot(east, north)
+        lower = (
+            row(("m/s² ", "bold"), point_of_compass(east, north)),
+            row(("up ", LABEL), f"{number(up, '+.2f')} m/s²"),
+        )
+        digits = _large(number(size, ".2f" if size < 10.0 else ".1f"), "", "")
+    texts = zip(large_arrow(east, north), [*digits, *lower], strict=True)
+    return box(title, [[*row((arrow, "bold"), "  "), *text] for arrow, text in texts], width)
 
 
 def _margin(scene: Scene, width: int) -> list[Row]:
@@ -158,12 +173,23 @@ def _texts(scene: Scene) -> Iterator[tuple[str, str, str]]:
         yield f"{clock(note.clock_s):>6}  ", text, severity_style(note.severity)
 
 
+def _wind_line(status: Status) -> Row:
+    if status.wind is not None:
+        arrow = small_arrow(*readings.pushes(status.wind))
+        return row(readings.label("wind"), (f"{arrow} {readings.wind_in_words(status.wind)}", "bold"))
+    east, north, up = readings.force(status)
+    return row(
+        readings.label("wind"),
+        (f"{small_arrow(east, north)} {number(math.hypot(east, north), '.2f')} m/s²", "bold"),
+        f"  up {number(up, '+.2f')}",
+    )
+
+
 def _compact(scene: Scene, top: Headline, width: int, height: int) -> Iterable[Row]:
     """One line a value, the most important first; three rows are kept for messages."""
     status = scene.status
     error = readings.error_m(status)
     digits, unit = readings.distance(error)
-    east, north, up = readings.force(status)
     left, colour = readings.margin(status.authority)
     filled, rest = bar(left, 10)
     hold = "cannot hold" if readings.cannot_hold(status.authority) else f"{number(left * 100.0, '.0f')} %"
@@ -172,11 +198,7 @@ def _compact(scene: Scene, top: Headline, width: int, height: int) -> Iterable[R
         [*row((f" {top.word}  {status.mode.value} ".ljust(width), _style(top)))],
         row((top.text, "bold")),
         row(name("error"), (f"{digits} {unit}", f"bold {readings.error_colour(error)}")),
-        row(
-            name("wind"),
-            (f"{small_arrow(east, north)} {number(math.hypot(east, north), '.2f')} m/s²", "bold"),
-            f"  up {number(up, '+.2f')}",
-        ),
+        _wind_line(status),
         row(name("margin"), (filled, colour), (rest, "dim"), (f" {hold}", colour)),
         readings.battery(status, 10),
         row(name("progress"), f"{number(status.progress * 100.0, '.0f')} %  {readings.leg(scene)}"),

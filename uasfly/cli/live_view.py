@@ -16,7 +16,7 @@ from rich.live import Live
 
 from uasfly.cli.capture import Capture
 from uasfly.cli.dashboard import Dashboard
-from uasfly.cli.readings import error_m
+from uasfly.cli.readings import error_m, wind_in_words
 from uasfly.cli.scene import Recent
 from uasfly.drivers.plan import FlightPlan
 from uasfly.drivers.watching import Cycle
@@ -122,4 +122,5 @@ def _plain_line(status: Status) -> str:
             parts.append(f"error {error_m(status) * 100:.1f} cm")
         fx, fy, fz = estimate.force_in_world.tolist()
         parts.append(f"force {fx:+.2f} {fy:+.2f} {fz:+.2f} m/s²")
+        parts.append(f"wind {wind_in_words(status.wind)}")
     return "  ".join(parts)

@@ -7,7 +7,20 @@ import sys
 import typer
 
 from uasfly import __version__
-from uasfly.cli import bench, calibrate, campaign, check, faults, fly, markers, preflight, rehearse, reproduce, sim
+from uasfly.cli import (
+    bench,
+    calibrate,
+    campaign,
+    check,
+    faults,
+    fly,
+    identify,
+    markers,
+    preflight,
+    rehearse,
+    reproduce,
+    sim,
+)
 
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
@@ -46,6 +59,7 @@ markers.register(app)
 campaign.register(app)
 reproduce.register(app)
 calibrate.register(app)
+identify.register(app)
 
 
 def main() -> None:

@@ -91,6 +91,8 @@ def summary_table(summary: dict[str, Any]) -> Table:
         table.add_row("position sensor RMS error", _axes(summary["gnss_rms_m"]))
     force = summary["force_m_s2"]
     table.add_row("mean wind force e/n/u", f"{force[0]:+.2f} {force[1]:+.2f} {force[2]:+.2f} m/s²")
+    if summary["wind"] is not None:
+        table.add_row("wind", _wind(summary["wind"]))
     table.add_row("solver", _times(summary["solve_ms"]))
     table.add_row("whole cycle", _times(summary["cycle_ms"]))
     if summary["latency_ms"] is not None:
@@ -103,6 +105,14 @@ def summary_table(summary: dict[str, Any]) -> Table:
     for warning in summary["warnings"]:
         table.add_row("[yellow]warning[/]", escape(warning))
     return table
+
+
+def _wind(wind: dict[str, float | None]) -> str:
+    origin = "" if wind["from_deg"] is None else f" from {wind['from_deg']:.0f}°"
+    return (
+        f"{wind['mean_m_s']:.1f} ± {wind['sigma_m_s']:.1f} m/s{origin}, gusts {wind['gust_m_s']:.1f} m/s; "
+        f"can be held: {wind['holdable_m_s']:.0f} m/s"
+    )
 
 
 def _axes(values: dict[str, float] | None) -> str:

@@ -8,6 +8,7 @@ from uasfly.cli.blocks import Row, row
 from uasfly.cli.gauges import GREEN, RED, UNKNOWN, YELLOW, bar, graded, length, number
 from uasfly.cli.scene import Scene
 from uasfly.messages import Authority, Phase, Status
+from uasfly.wind_messages import WindEstimate
 
 LABEL = "cyan"
 _LABEL_WIDTH = 10
@@ -50,6 +51,27 @@ def force(status: Status) -> tuple[float, float, float]:
         return math.nan, math.nan, math.nan
     east, north, up = status.estimate.force_in_world.tolist()
     return east, north, up
+
+
+def wind_from(wind: WindEstimate) -> str:
+    """Where the wind comes from, "" where it is too weak to say."""
+    return f"from {wind.mean_from_deg:.0f}°" if math.isfinite(wind.mean_from_deg) else ""
+
+
+def wind_in_words(wind: WindEstimate | None) -> str:
+    """Speed, direction and gusts in a line."""
+    if wind is None:
+        return "unknown"
+    words = f"{number(wind.mean_speed_m_s, '.1f')} m/s {wind_from(wind)}".rstrip()
+    return f"{words}, gusts {number(wind.gust_m_s, '.1f')}"
+
+
+def pushes(wind: WindEstimate) -> tuple[float, float]:
+    """Where the wind pushes, east and north; NaN where it is too weak to say."""
+    if not math.isfinite(wind.mean_from_deg):
+        return math.nan, math.nan
+    east, north = wind.mean_in_world.tolist()
+    return east, north
 
 
 def margin(authority: Authority | None) -> tuple[float, str]:

@@ -36,6 +36,7 @@ from uasfly.record.writer import BackgroundLogWriter
 
 HAND_OVER_S = 2.5  # time for the last request to be repeated and answered
 HAND_OVER_POLL_S = 0.05
+WIND_INTERVAL_S = 1.0  # between two winds told to the ground station
 TOLD_SEVERITY = 5  # and worse: notice, warning, error ...
 
 
@@ -105,6 +106,7 @@ class _LiveFlight:
         self._eyes = eyes
         self._true_markers = true_markers
         self._log_lost = False
+        self._wind_due_s = -math.inf
         self._facts: asyncio.Task[FactsSample] | None = None
 
     async def run(self, period_s: float, facts: asyncio.Task[FactsSample] | None) -> None:
@@ -191,6 +193,9 @@ class _LiveFlight:
         for severity, text in status.announcements:
             if severity <= TOLD_SEVERITY:
                 self._link.send_text(severity, f"uasfly: {text}")
+        if status.wind is not None and status.time_s >= self._wind_due_s:
+            self._wind_due_s = status.time_s + WIND_INTERVAL_S
+            self._link.send_wind(status.wind)
 
     def _record(self, result: StepResult, samples: tuple[Sample, ...]) -> None:
         if self._writer is not None:

@@ -27,6 +27,7 @@ from uasfly.messages import (
     Alarm,
     Array,
     Authority,
+    OdometrySample,
     Phase,
     ReferenceHorizon,
     Request,
@@ -40,6 +41,9 @@ from uasfly.mission import Mission
 from uasfly.observer.diagnosis import Diagnosis
 from uasfly.observer.observer import Observer
 from uasfly.preflight_messages import PreflightCheck
+from uasfly.wind.drag_curve import wind_settings
+from uasfly.wind.meter import WindMeter
+from uasfly.wind_messages import WindEstimate
 
 _ENDINGS = {Action.END: None, Action.RETURN: EndingAction.RETURN, Action.LAND: EndingAction.LAND}
 
@@ -103,6 +107,9 @@ class Pilot:
             self._guide = MarkerGuide(mission.marker, marker_id, airframe.limits.yaw_rate_rad_s)
         self._meter = AuthorityMeter(airframe.limits, airframe.model, mission.transition.speed_m_s)
         self._authority: Authority | None = None  # at the monitors' last look
+        wind = wind_settings(airframe)
+        self._wind_meter = None if wind is None else WindMeter(wind, airframe.limits)
+        self._wind: WindEstimate | None = None
         self._response = Response()
         self._phase = self.sequencer.phase  # as far as this object has followed it
         self._ground: Array | None = None  # where the vehicle last stood
@@ -142,14 +149,19 @@ class Pilot:
             samples: what has arrived since the last cycle.
         """
         self.view.update(samples)
+        meter = self._wind_meter
         for sample in samples:
             self.observer.add(sample)
+            if meter is not None and isinstance(sample, OdometrySample):
+                meter.add(sample)
         k_thrust = self.controller.k_thrust_m_s2(self.view.voltage_v)
         self.observer.set_k_thrust(k_thrust)
         estimate = self.observer.estimate(time_s)
         if estimate is not None:
             self._note_places(estimate)
 
+        if meter is not None:
+            self._wind = meter.step(time_s, estimate, self.view.in_air, k_thrust)
         sequencer = self.sequencer
         for number, away_m in self.observer.take_moved():
             self.announce(4, f"bundle {number} is seen {away_m:.2f} m from where it was: moved; it is taken anew")
@@ -284,6 +296,7 @@ class Pilot:
                     authority=self._authority,
                     marker=None if guide is None else guide.marker,
                     by_marker=guide is not None and self.course.begun,
+                    wind=self._wind,
                 )
             )
         alarms = self.monitors.alarms
@@ -365,4 +378,5 @@ class Pilot:
             pilot_flies=sequencer.pilot_flies,
             marker_age_s=math.nan if self._guide is None else self._guide.age_s,
             waits_for="the marker" if in_legs and self._guide is not None and not course.begun else "",
+            wind=self._wind,
         )

@@ -14,6 +14,7 @@ import numpy as np
 
 from uasfly.errors import FileError
 from uasfly.flight.tracking_errors import MarkerDatum, TrackingErrors
+from uasfly.flight.wind_summary import WindSummary
 from uasfly.messages import Array, MarkerSample, OdometrySample, Phase, Sample, Status, TruthSample
 from uasfly.preflight_messages import PreflightCheck
 
@@ -36,6 +37,7 @@ class SummaryCollector:
     duration_s: float = 0.0
     _first_s: float | None = None
     _errors: TrackingErrors = field(default_factory=TrackingErrors)
+    _wind: WindSummary = field(default_factory=WindSummary)
     _force_sum: Array = field(default_factory=lambda: np.zeros(3))
     _force_count: int = 0
     _solve_ms: array[float] = field(default_factory=_figures)
@@ -72,9 +74,13 @@ class SummaryCollector:
         for sample in samples:
             if isinstance(sample, _COMPARED):
                 self._errors.hear(sample)
+                if isinstance(sample, TruthSample):
+                    self._wind.hear(sample)
             elif isinstance(sample, MarkerSample):
                 self._sighted_s.append(sample.time_s)
                 self._sighting_latency_ms.append((status.time_s - sample.time_s) * 1e3)
+        if flying and status.leg_started:
+            self._wind.cycle(status)
 
     def abort(self, status: Status) -> None:
         """The flight was broken off outside of the step; `status` tells why, and nothing is computed from it."""
@@ -132,6 +138,7 @@ class SummaryCollector:
             "rejected": dict(rejected),
             "sightings": self._sightings(),
             "force_m_s2": [round(value, 4) for value in force.tolist()],
+            "wind": self._wind.result(),
             "real_time_factor": round(self.duration_s / wall_s, 3) if wall_s > 0.0 else None,
             "warnings": list(self._warnings),
             "preflight": list(self._preflight),

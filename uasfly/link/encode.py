@@ -11,6 +11,7 @@ import math
 
 from uasfly.frames import quaternion_from_euler, swap_quaternion_enu_ned
 from uasfly.messages import Setpoint
+from uasfly.wind_messages import WindEstimate
 
 AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 COMPANION = 195  # the component id that MAVSDK gives a companion computer
@@ -95,6 +96,37 @@ def parameter_request(system_id: int, name: str) -> str:
 def time_request(system_id: int, sent_ns: int) -> str:
     """TIMESYNC request: the vehicle returns `sent_ns` with its own time."""
     return json.dumps({"tc1": 0, "ts1": sent_ns, "target_system": system_id, "target_component": AUTOPILOT})
+
+
+def wind_covariance(wind: WindEstimate, vehicle_time_s: float) -> str:
+    """WIND_COV with the mean wind, as ground stations show it: NED, towards where the air moves.
+
+    The vertical wind is not known: NaN, with an accuracy of 0, which stands for unknown there. The altitude above the
+    sea is not known here either.
+
+    Args:
+        wind: the estimate, finite.
+        vehicle_time_s: its time on the vehicle's clock, 0 where it is not known.
+
+    Raises:
+        ValueError: when speed or sigma is not finite.
+    """
+    east, north = wind.mean_in_world.tolist()
+    accuracy, gustiness = wind.mean_speed_sigma_m_s, wind.variability_m_s
+    if not all(map(math.isfinite, (east, north, accuracy, gustiness))):
+        raise ValueError(f"a wind must be finite, found {wind}")
+    fields = {
+        "time_usec": max(0, int(vehicle_time_s * 1e6)),
+        "wind_x": north,
+        "wind_y": east,
+        "wind_z": None,  # mavlink_direct sends null as NaN
+        "var_horiz": gustiness,
+        "var_vert": None,
+        "wind_alt": None,
+        "horiz_accuracy": accuracy,
+        "vert_accuracy": 0.0,
+    }
+    return json.dumps(fields, allow_nan=False)
 
 
 def status_texts(severity: int, text: str, message_id: int) -> list[str]:

@@ -36,6 +36,7 @@ from uasfly.messages import (
     TruthSample,
     VehicleSample,
 )
+from uasfly.wind_messages import WindEstimate
 
 ODOMETRY_RATE_HZ = 100.0
 ATTITUDE_TARGET_RATE_HZ = 50.0
@@ -216,6 +217,9 @@ class InProcessLink:
 
     def send_text(self, severity: int, text: str) -> None:
         """Texts to the ground station go nowhere: a rehearsal has none."""
+
+    def send_wind(self, wind: WindEstimate) -> None:
+        """Nor does the wind."""
 
     def request(self, request: Request) -> None:
         """Ask the vehicle; the answer arrives as a RequestResult."""

@@ -20,7 +20,7 @@ from uasfly.link.bridge import Bridge
 from uasfly.link.clock import ClockMap
 from uasfly.link.commands import CommandChannel
 from uasfly.link.decoder import MALFORMED, Decoder
-from uasfly.link.encode import attitude_target, check_setpoint, status_texts
+from uasfly.link.encode import attitude_target, check_setpoint, status_texts, wind_covariance
 from uasfly.link.events import EchoFilter, EventFeed
 from uasfly.link.finding import find_vehicle, refuse_several
 from uasfly.link.modes import CMD_REQUEST_MESSAGE
@@ -31,6 +31,7 @@ from uasfly.link.timesync import TimeSync
 from uasfly.link.upkeep import WARNING, Upkeep
 from uasfly.link.urls import ConnectionUrl, parse_url
 from uasfly.messages import Array, LinkEvent, LinkSample, Request, Sample, Setpoint, TextSample
+from uasfly.wind_messages import WindEstimate
 
 SETTLING_S = 1.0  # `connect` waits this long for the first time exchanges and message intervals
 SETTLED_EXCHANGES = 5
@@ -237,6 +238,15 @@ class MavsdkLink:
         """
         for fields in status_texts(severity, text, next(self._text_ids)):
             self._bridge.send("STATUSTEXT", fields)
+
+    def send_wind(self, wind: WindEstimate) -> None:
+        """Send the mean wind as WIND_COV; PX4 forwards it to the ground station.
+
+        Raises:
+            ValueError: when it is not finite.
+            LinkError: after `close`.
+        """
+        self._bridge.send("WIND_COV", wind_covariance(wind, self._clock.to_vehicle(wind.time_s)))
 
     async def read_parameters(self, names: Iterable[str]) -> dict[str, float | None]:
         """Parameters of the vehicle by name; None for one that it does not have, or does not tell within 1.2 s.

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from uasfly.messages import Array, Request, Sample, Setpoint
+from uasfly.wind_messages import WindEstimate
 
 
 class VehicleLink(Protocol):
@@ -29,6 +30,10 @@ class VehicleLink(Protocol):
 
     def send_text(self, severity: int, text: str) -> None:
         """Send a status text for the ground station; severity as in MAVLink, 0 emergency .. 7 debug."""
+        ...
+
+    def send_wind(self, wind: WindEstimate) -> None:
+        """Tell the ground station the wind."""
         ...
 
 

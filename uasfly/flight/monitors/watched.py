@@ -8,6 +8,7 @@ from uasfly.flight.view import VehicleView
 from uasfly.messages import Array, Authority, StateEstimate
 from uasfly.observer.diagnosis import Diagnosis
 from uasfly.observer.sightings import MarkerEstimate
+from uasfly.wind_messages import WindEstimate
 
 
 @dataclass(slots=True)
@@ -25,6 +26,7 @@ class Watched:
         authority: what the wind has taken.
         marker: that the mission hangs on, None where the filter does not know it.
         by_marker: the mission hangs on a marker, and has begun.
+        wind: None where it is not known.
     """
 
     time_s: float
@@ -38,3 +40,4 @@ class Watched:
     authority: Authority
     marker: MarkerEstimate | None = None
     by_marker: bool = False
+    wind: WindEstimate | None = None

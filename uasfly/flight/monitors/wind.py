@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 from uasfly.airframe import Airframe
 from uasfly.flight.monitors.watched import Watched
 from uasfly.mission import Mission
 from uasfly.monitor_settings import WindMonitor
 
-LONGEST_STEP_S = 0.1  # after a pause one sample is no mean
-STEADY_S = 10.0  # time constant of the mean that a limit in m/s is held against
+STEADY_S = 5.0  # of wind at least, for a mean that a limit in m/s is held against
 
 
 class WindTakesMuch:
@@ -55,23 +52,15 @@ class CannotHold:
 
 
 class BeyondWindLimit:
-    """Steady wind above the limit of the mission, or of the airframe, in m/s from force over drag."""
+    """Mean wind above the limit of the mission, or of the airframe."""
 
     def __init__(self, mission: Mission, airframe: Airframe) -> None:
         """Take the limit."""
         self._limit_m_s = mission.limits.wind_m_s or airframe.limits.wind_m_s
-        self._drag_1_s = max(airframe.model.drag_1_s[:2])
-        self._mean = [0.0, 0.0]
-        self._time_s: float | None = None
 
     def __call__(self, watched: Watched) -> str:
-        """How strong it is."""
-        east, north, _ = watched.estimate.force_in_world.tolist()
-        elapsed = 0.0 if self._time_s is None else min(watched.time_s - self._time_s, LONGEST_STEP_S)
-        self._time_s = watched.time_s
-        if not math.isfinite(east + north) or self._drag_1_s <= 0.0:
+        """How strong it is, once there is a mean of some seconds."""
+        wind = watched.wind
+        if wind is None or wind.averaged_s < STEADY_S or not wind.mean_speed_m_s > self._limit_m_s:
             return ""
-        weight = 1.0 - math.exp(-elapsed / STEADY_S)
-        self._mean = [self._mean[0] + weight * (east - self._mean[0]), self._mean[1] + weight * (north - self._mean[1])]
-        speed = math.hypot(*self._mean) / self._drag_1_s
-        return f"steady wind of {speed:.0f} m/s, the limit is {self._limit_m_s:g}" if speed > self._limit_m_s else ""
+        return f"steady wind of {wind.mean_speed_m_s:.0f} m/s, the limit is {self._limit_m_s:g}"

@@ -1,0 +1,1 @@
+"""Figures of an airframe from the logs of its flights."""
