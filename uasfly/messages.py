@@ -11,7 +11,7 @@ import enum
 import math
 from dataclasses import field
 
-from uasfly.message_class import Array as Array
+from uasfly.message_class import Array as Array  # noqa: PLC0414  (everybody takes it from here)
 from uasfly.message_class import message
 from uasfly.wind_messages import WindEstimate
 

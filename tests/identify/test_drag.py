@@ -26,6 +26,7 @@ from uasfly.yaml_text import parse_yaml
 
 SHORT = [
     "airframe.limits.speed_m_s=10",
+    "mission.limits.geofence.radius_m=100",
     "mission.legs=[{type: back_and_forth, start_m: [0, 0, 3], end_m: [25, 0, 3], speed_m_s: 4, passes: 2}, "
     "{type: back_and_forth, start_m: [0, 0, 3], end_m: [80, 0, 3], speed_m_s: 10, passes: 2}]",
 ]

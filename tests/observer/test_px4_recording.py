@@ -15,7 +15,7 @@ from uasfly.observer import Observer
 
 def sih_quad() -> Airframe:
     """The recording's true parameters; a dead time of 40 ms stands for the lag of its motors (50 ms)."""
-    airframe = f550(force_density=0.5)
+    airframe = f550(force_density=0.5, velocity_wander_m_s=0.01)  # as in calm.yaml, which follows PX4's simulator
     parameters = {"k_thrust_m_s2": 20.0, "drag_1_s": (1.0, 1.0, 1.0), "command_delay_s": 0.04}
     return airframe.model_copy(update={"model": airframe.model.model_copy(update=parameters)})
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
-BELOW = {"uasfly", "uasfly.airframe", "uasfly.errors", "uasfly.frames", "uasfly.messages"}
+MESSAGES = {"uasfly.message_class", "uasfly.messages", "uasfly.wind_messages"}
+BELOW = {"uasfly", "uasfly.airframe", "uasfly.errors", "uasfly.frames", *MESSAGES}
 
 
 def test_the_wind_imports_airframe_frames_and_messages_alone() -> None:

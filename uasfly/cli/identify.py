@@ -24,7 +24,7 @@ def drag(
 
     The shipped mission drag flies what it takes; the faster, the better strong wind is known.
 
-    Example: [bold]uasfly fly drag --airframe my.yaml --set airframe.limits.speed_m_s=10 --log d.mcap[/], then
+    Example: [bold]uasfly fly drag --airframe my.yaml --log d.mcap[/], then
     [bold]uasfly identify drag d.mcap[/]
     """
     from uasfly.identify.drag import identify_drag, moments

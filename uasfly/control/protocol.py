@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from uasfly.messages import Array, ReferenceHorizon, Setpoint, StateEstimate, message
+from uasfly.message_class import message
+from uasfly.messages import Array, ReferenceHorizon, Setpoint, StateEstimate
 
 ReferenceAt = Callable[[Array], ReferenceHorizon]  # reference at absolute times (n,) [s], on the clock of the estimates
 Timer = Callable[[], float]  # seconds; time.perf_counter where a driver measures

@@ -8,7 +8,8 @@ from collections.abc import Callable
 
 from uasfly.errors import describe_error
 from uasfly.flight.tracking_errors import MarkerDatum
-from uasfly.messages import Sample, Status, message
+from uasfly.message_class import message
+from uasfly.messages import Sample, Status
 
 BACKLOG = 200  # steps that wait for a terminal; beyond them only those that announce something are kept
 CLOSE_TIMEOUT_S = 1.0

@@ -8,7 +8,8 @@ import numpy as np
 
 from uasfly.airframe import Limits
 from uasfly.frames import euler_from_quaternion, wrap_angle
-from uasfly.messages import Action, Array, ReferenceHorizon, StateEstimate, message
+from uasfly.message_class import message
+from uasfly.messages import Action, Array, ReferenceHorizon, StateEstimate
 from uasfly.mission import Mission
 from uasfly.trajectories.crossfade import Crossfade
 from uasfly.trajectories.feasibility import check_placed

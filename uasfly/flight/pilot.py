@@ -22,6 +22,7 @@ from uasfly.flight.preflight import Preflight, announcements, as_pilot_flies, st
 from uasfly.flight.response import Response
 from uasfly.flight.sequencer import Sequencer
 from uasfly.flight.view import VehicleView
+from uasfly.message_class import message
 from uasfly.messages import (
     Action,
     Alarm,
@@ -35,7 +36,6 @@ from uasfly.messages import (
     Setpoint,
     StateEstimate,
     Status,
-    message,
 )
 from uasfly.mission import Mission
 from uasfly.observer.diagnosis import Diagnosis

@@ -12,7 +12,8 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from uasfly.messages import Array, OdometrySample, TruthSample, message
+from uasfly.message_class import message
+from uasfly.messages import Array, OdometrySample, TruthSample
 
 EVERY_CYCLES = 32  # what has come since then is compared together: 0.13 ms, not 27 us in every cycle
 KEPT = 512  # of each kind, seconds: as late truth and GNSS may come
