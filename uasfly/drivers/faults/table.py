@@ -14,7 +14,7 @@ from uasfly.drivers.faults.outcome import Outcome
 from uasfly.drivers.faults.rehearsed import fly_rehearsed
 from uasfly.errors import UasflyError
 
-LIVE_PER_CORE = 2.5  # a flight over MAVLink takes about a third of a core, its vehicle included
+LIVE_PER_CORE = 2.0  # a flight over MAVLink takes about a third of a core, its vehicle included
 
 
 def select_cases(names: list[str], rehearsed_only: bool = False) -> list[FaultCase]:
