@@ -54,6 +54,10 @@ class Controller(Protocol):
         """Thrust acceleration at full command that the controller reckons with [m/s^2]; the observer needs the same."""
         ...
 
+    def trim_thrust(self, trim: float) -> None:
+        """From now on the thrust is (1 + trim) times what airframe file and voltage say."""
+        ...
+
     @property
     def fallback_steps(self) -> dict[str, int]:
         """How many steps each fallback has replaced the solver's answer in, by name."""
