@@ -22,9 +22,9 @@ WALK_DENSITY = 0.06 / math.sqrt(600.0)  # 1/sqrt(s): 6 % in ten minutes; a batte
 WIND_TIME_S = 3.0  # of the vertical wind's correlation, and of the low-pass that tells how strong it is
 LEAST_WIND_M_S2 = 0.1  # standard deviation of the slow part of its force, at least
 FIRST_WIND_M_S2 = 0.3
-RISE_S, FALL_S = 5.0, 30.0  # over which the variance is followed: a jet counts soon, a lull late
+RISE_S, FALL_S = 2.0, 15.0  # over which the variance is followed: a jet counts soon, a lull late
 NEAR_HOVER_M_S = 0.3  # faster climbs change the rotors' inflow, and with it the thrust: by 3 % at this
-LARGEST_SIGMAS = 3.0  # an innovation beyond counts as one of this size: touch-down, a push
+LARGEST_SIGMAS = 1.5  # an innovation beyond counts as one of this size (Huber 1964): the first second of a push
 LONGEST_STEP_S = 1.0  # what came before a longer pause tells nothing of the wind
 
 
