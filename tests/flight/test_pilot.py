@@ -116,8 +116,9 @@ class FakeController:
         """Any."""
         return 28.5
 
-    def trim_thrust(self, trim: float) -> None:
+    def trim_thrust(self, trim: float) -> float:
         """Take none."""
+        return 0.0
 
     def reset(self, time_s: float, setpoint: Setpoint | None) -> None:
         """Remember."""

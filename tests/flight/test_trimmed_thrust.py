@@ -24,8 +24,8 @@ LEVEL, ZERO, SIGMA = np.array((1.0, 0.0, 0.0, 0.0)), np.zeros(3), np.full(3, 0.1
 class Reckoning:
     """Stands for observer and controller; `force` is what it takes to balance a thrust that is `true` shares off."""
 
-    def __init__(self, true: float) -> None:
-        self.true = true
+    def __init__(self, true: float, *, takes: bool = True) -> None:
+        self.true, self.takes = true, takes
         self.scale = 1.0  # of the observer's thrust
         self.trims: list[float] = []
         self.trimmed = TrimmedThrust(cast(Observer, self), cast(Controller, self))
@@ -35,9 +35,10 @@ class Reckoning:
         """As the observer does."""
         self.scale *= ratio
 
-    def trim_thrust(self, trim: float) -> None:
+    def trim_thrust(self, trim: float) -> float:
         """As the controller does."""
-        self.trims.append(trim)
+        self.trims.append(trim if self.takes else 0.0)
+        return self.trims[-1]
 
     def fly(self, start_s: float, end_s: float, *, in_air: bool = True) -> None:
         """Hover."""
@@ -58,6 +59,14 @@ def test_both_are_told_the_same_five_times_a_second() -> None:
     assert reckoning.scale == pytest.approx(1.0 + reckoning.trims[-1])
     assert len(reckoning.trims) == pytest.approx((60.0 - OFF_THE_GROUND_S) / INTERVAL_S, abs=2)
     assert not reckoning.texts
+
+
+def test_a_controller_that_takes_no_trim_leaves_all_as_it_was() -> None:
+    """The observer has to reckon with the controller's thrust."""
+    reckoning = Reckoning(-0.08, takes=False)
+    reckoning.fly(0.0, 60.0)
+    assert reckoning.trimmed.trim == 0.0
+    assert reckoning.scale == 1.0
 
 
 def test_it_is_frozen_on_the_ground_and_just_above() -> None:

@@ -54,8 +54,8 @@ class Controller(Protocol):
         """Thrust acceleration at full command that the controller reckons with [m/s^2]; the observer needs the same."""
         ...
 
-    def trim_thrust(self, trim: float) -> None:
-        """From now on the thrust is (1 + trim) times what airframe file and voltage say."""
+    def trim_thrust(self, trim: float) -> float:
+        """The thrust is (1 + trim) times what airframe file and voltage say; returns the trim that is reckoned with."""
         ...
 
     @property

@@ -59,11 +59,10 @@ class TrimmedThrust:
             float(estimate.force_sigma_m_s2[up]),
             float(estimate.velocity_in_world[up]),
         )
+        self.trim = self._estimator.trim = trim = self._controller.trim_thrust(trim)
         if trim == before:
             return ""
-        self.trim = trim
         self._observer.correct_thrust((1.0 + trim) / (1.0 + before))
-        self._controller.trim_thrust(trim)
         return self._tell(trim)
 
     def _tell(self, trim: float) -> str:
