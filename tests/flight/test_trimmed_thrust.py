@@ -1,4 +1,4 @@
-"""Observer and controller reckon with the same trimmed thrust, and the flight tells of it."""
+"""Observer and controller reckon with the trimmed thrust, and the flight tells of it."""
 
 from __future__ import annotations
 
@@ -40,6 +40,10 @@ class Reckoning:
         self.trims.append(trim if self.takes else 0.0)
         return self.trims[-1]
 
+    def k_thrust_m_s2(self, _: float | None) -> float:
+        """As the controller does."""
+        return 28.5 * (1.0 + (self.trims[-1] if self.trims else 0.0))
+
     def fly(self, start_s: float, end_s: float, *, in_air: bool = True) -> None:
         """Hover."""
         for cycle in range(round(start_s / PERIOD_S), round(end_s / PERIOD_S)):
@@ -61,12 +65,13 @@ def test_both_are_told_the_same_five_times_a_second() -> None:
     assert not reckoning.texts
 
 
-def test_a_controller_that_takes_no_trim_leaves_all_as_it_was() -> None:
-    """The observer has to reckon with the controller's thrust."""
-    reckoning = Reckoning(-0.08, takes=False)
+@pytest.mark.parametrize("takes", [True, False])
+def test_the_observer_has_the_trim_whatever_the_controller_takes(takes: bool) -> None:
+    """The PIDs' integral needs none."""
+    reckoning = Reckoning(-0.08, takes=takes)
     reckoning.fly(0.0, 60.0)
-    assert reckoning.trimmed.trim == 0.0
-    assert reckoning.scale == 1.0
+    assert reckoning.trimmed.k_thrust_m_s2(None) == pytest.approx(28.5 * reckoning.scale)
+    assert reckoning.scale == pytest.approx(0.92, abs=0.005)
 
 
 def test_it_is_frozen_on_the_ground_and_just_above() -> None:

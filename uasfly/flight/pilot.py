@@ -160,7 +160,7 @@ class Pilot:
         text = self._thrust.step(time_s, self._estimate, self.view.in_air)
         if text:
             self.announce(4, text)
-        k_thrust = self.controller.k_thrust_m_s2(self.view.voltage_v)
+        k_thrust = self._thrust.k_thrust_m_s2(self.view.voltage_v)
         self.observer.set_k_thrust(k_thrust)
         estimate = self._estimate = self.observer.estimate(time_s)
         if estimate is not None:

@@ -1,4 +1,4 @@
-"""Keeps observer and controller to the same trimmed thrust, and tells when it is far from the airframe file's."""
+"""Trims the thrust of observer and controller, and tells when it is far from the airframe file's."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class TrimmedThrust:
         self._due_s = -math.inf
         self._flies = False
         self._told = 0.0
-        self.trim = 0.0
+        self.trim = self._taken = 0.0
 
     def step(self, time_s: float, estimate: StateEstimate | None, in_air: bool) -> str:
         """Before the observer is asked for `time_s`; frozen on the ground.
@@ -59,11 +59,15 @@ class TrimmedThrust:
             float(estimate.force_sigma_m_s2[up]),
             float(estimate.velocity_in_world[up]),
         )
-        self.trim = self._estimator.trim = trim = self._controller.trim_thrust(trim)
         if trim == before:
             return ""
+        self.trim, self._taken = trim, self._controller.trim_thrust(trim)
         self._observer.correct_thrust((1.0 + trim) / (1.0 + before))
         return self._tell(trim)
+
+    def k_thrust_m_s2(self, battery_voltage_v: float | None) -> float:
+        """Thrust acceleration at full command [m/s^2], whatever of the trim the controller takes."""
+        return self._controller.k_thrust_m_s2(battery_voltage_v) * (1.0 + self.trim) / (1.0 + self._taken)
 
     def _tell(self, trim: float) -> str:
         size = abs(trim)

@@ -100,8 +100,8 @@ class _Fed:
     def k_thrust_m_s2(self, battery_voltage_v: float | None) -> float:
         return self._controller.k_thrust_m_s2(battery_voltage_v)
 
-    def trim_thrust(self, trim: float) -> float:  # noqa: ARG002 - the protocol's signature
-        return 0.0  # the force that is leant against here is not the observer's, and has what wind does to the thrust
+    def trim_thrust(self, trim: float) -> float:
+        return self._controller.trim_thrust(trim)
 
     def reset(self, time_s: float, setpoint: Setpoint | None) -> None:
         self._controller.reset(time_s, setpoint)
