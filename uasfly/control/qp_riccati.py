@@ -14,7 +14,7 @@ import numpy as np
 
 from uasfly.control.interior_point import InteriorPoint
 from uasfly.control.qp import Active, QpOptions, QpSolution, SolveStatus, StageQp
-from uasfly.control.riccati import StageFunctions
+from uasfly.control.riccati_machine import MachineFunctions
 from uasfly.control.sweeps import RiccatiSweeps
 
 MANY = 0.25  # changes a stage; where more than so many do not become fewer, the guess is no good
@@ -23,9 +23,11 @@ MANY = 0.25  # changes a stage; where more than so many do not become fewer, the
 class RiccatiQp:
     """QpSolver for N stages; one instance is for one thread."""
 
-    def __init__(self, stages: StageFunctions, packed_size: int, nodes: int, options: QpOptions | None = None) -> None:
+    def __init__(
+        self, functions: MachineFunctions, packed_size: int, nodes: int, options: QpOptions | None = None
+    ) -> None:
         self._options = options or QpOptions()
-        self._sweeps = RiccatiSweeps(stages, packed_size, nodes)
+        self._sweeps = RiccatiSweeps(functions, packed_size, nodes)
 
     def solve(self, qp: StageQp, active: Active) -> QpSolution:
         """Solve from a guess of the active bounds."""

@@ -69,14 +69,17 @@ class _Factor:
     @classmethod
     def of(cls, matrix: ca.SX) -> _Factor:
         pivots: list[ca.SX] = []
+        reciprocals: list[ca.SX] = []
         lower: dict[tuple[int, int], ca.SX] = {}
         for k in range(INPUTS):
             pivot = matrix[k, k] - sum(lower[k, j] ** 2 * pivots[j] for j in range(k))
             pivots.append(pivot)
+            # Pivots are positive. A bare reciprocal CasADi would turn back into a division at each of its ten uses.
+            reciprocals.append(ca.fabs(1.0 / pivot))
             for i in range(k + 1, INPUTS):
                 rest = matrix[i, k] - sum(lower[i, j] * lower[k, j] * pivots[j] for j in range(k))
-                lower[i, k] = rest / pivot
-        return cls([1.0 / pivot for pivot in pivots], lower)
+                lower[i, k] = rest * reciprocals[k]
+        return cls(reciprocals, lower)
 
     @classmethod
     def unpacked(cls, packed: ca.SX) -> _Factor:
@@ -110,8 +113,9 @@ def stage_functions(pattern: JacobianPattern, *, products_given: bool = False) -
 
     Args:
         pattern: of [A B].
-        products_given: whether `backward` and `barrier_backward` take two products of P before all other arguments, for
-            callers that have them cheaper: with the last columns of [A B] from roll on (8 rows), and with c + B fixed.
+        products_given: whether `backward` and `barrier_backward` take two products before all other arguments, for
+            callers that have them cheaper: Y = [P W, P (c + B fixed) + p] (8, 6) with the columns W of [A B] from roll
+            on, and Y' W (6, 5), both as vectors by columns.
     """
     symbol = ca.SX.sym
     cost, slope, packed, defect = (
@@ -128,14 +132,26 @@ def stage_functions(pattern: JacobianPattern, *, products_given: bool = False) -
     a, b = jacobian[:, :STATES], jacobian[:, STATES:]
 
     hessian = _symmetric(cost, STATES)
-    carried, cost_of_defect = hessian @ jacobian[:, ROLL:], hessian @ defect
-    cost_of_held = hessian @ (defect + b @ fixed)
-    given: list[ca.SX] = []
+    first, last = jacobian[:, :ROLL], jacobian[:, ROLL:]  # position and velocity; tilt and inputs
+    carried, ahead, ahead_of_held = hessian @ last, hessian @ defect + slope, hessian @ (defect + b @ fixed) + slope
+    products, given = ca.SX(), []
     if products_given:
-        carried, cost_of_defect = symbol("PJ", *carried.shape), symbol("Pd", STATES)
-        given, cost_of_held = [carried, cost_of_defect], cost_of_defect
-    carried_x, carried_u = ca.horzcat(hessian @ a[:, :ROLL], carried[:, : STATES - ROLL]), carried[:, STATES - ROLL :]
-    h_xx, h_ux, h_uu = ca.diag(weight_x) + a.T @ carried_x, carried_u.T @ a, ca.diag(weight_u) + b.T @ carried_u
+        width = last.shape[1]
+        given = [symbol("Y", STATES * (width + 1)), symbol("YW", (width + 1) * width)]
+        joint, products = ca.reshape(given[0], STATES, width + 1), ca.reshape(given[1], width + 1, width)
+        carried, ahead, ahead_of_held = joint[:, :-1], joint[:, -1], joint[:, -1]
+    square = products[:-1, :] if products_given else last.T @ carried
+    mixed, tilt = first.T @ carried, STATES - ROLL
+    corner = mixed[:, :tilt]
+    h_xx = ca.diag(weight_x) + ca.blockcat(
+        [[first.T @ (hessian[:, :ROLL] @ first[:ROLL, :]), corner], [corner.T, square[:tilt, :tilt]]]
+    )
+    h_ux, h_uu = ca.horzcat(mixed[:, tilt:].T, square[:tilt, tilt:].T), ca.diag(weight_u) + square[tilt:, tilt:]
+
+    def gradients(ahead: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """[A B]' ahead, the part of the states and that of the inputs."""
+        of_last = products[-1, :].T if products_given else last.T @ ahead
+        return ca.vertcat(first.T @ ahead, of_last[:tilt]), of_last[tilt:]
 
     def eliminate(uu: ca.SX, ux: ca.SX, u: ca.SX, x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, _Factor]:
         factor = _Factor.of(uu)
@@ -152,16 +168,16 @@ def stage_functions(pattern: JacobianPattern, *, products_given: bool = False) -
     for i in range(INPUTS):
         for k in range(INPUTS):
             masked[i, k] = free[i] * free[k] * h_uu[i, k] if i != k else free[i] * h_uu[i, i] + (1.0 - free[i])
-    ahead = cost_of_held + slope
-    h_u = r + weight_u * fixed + b.T @ ahead
-    p_next, s_next, big_k, small_k, _ = eliminate(masked, ca.diag(free) @ h_ux, free * h_u, q + a.T @ ahead)
+    gradient_x, gradient_u = gradients(ahead_of_held)
+    h_u = r + weight_u * fixed + gradient_u
+    p_next, s_next, big_k, small_k, _ = eliminate(masked, ca.diag(free) @ h_ux, free * h_u, q + gradient_x)
     arguments = [*given, cost, slope, packed, defect, q, r, weight_x, weight_u]
     results = [p_next, s_next, big_k, small_k, ca.vec(h_ux), upper_triangle(h_uu), h_u]
     backward = _function("uasfly_backward", [*arguments, free, fixed], results)
 
-    ahead = cost_of_defect + slope
-    p_next, s_next, big_k, small_k, factor = eliminate(h_uu, h_ux, r + b.T @ ahead, q + a.T @ ahead)
-    results = [p_next, s_next, big_k, small_k, factor.packed(), cost_of_defect]
+    gradient_x, gradient_u = gradients(ahead)
+    p_next, s_next, big_k, small_k, factor = eliminate(h_uu, h_ux, r + gradient_u, q + gradient_x)
+    results = [p_next, s_next, big_k, small_k, factor.packed(), ahead - slope]
     barrier_backward = _function("uasfly_barrier_backward", arguments, results)
 
     stored, stored_cost = symbol("factor", FACTOR), symbol("Pc", STATES)

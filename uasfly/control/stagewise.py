@@ -18,7 +18,7 @@ class Stagewise:
     Args:
         function: of dense arguments and results.
         arguments: (N, n) each, one row a stage; or (n,), the same for all stages.
-        results: (N, n) each.
+        results: (N, n) each; or (n,), where a stage leaves what it needs no longer than until the next one.
 
     Attributes:
         calls: evaluate one stage each, in the order of the stages; only while this object lives: they hold no
@@ -38,7 +38,7 @@ class Stagewise:
         sparsities += [function.sparsity_out(i) for i in range(function.n_out())]
         for array, sparsity in zip((*arguments, *results), sparsities, strict=True):
             _check(function.name(), array, sparsity)
-        stages = results[0].shape[0]
+        stages = next(array.shape[0] for array in (*arguments, *results) if array.ndim == 2)
         if any(array.shape[0] != stages for array in (*arguments, *results) if array.ndim == 2):
             raise ValueError(f"{function.name()} needs arrays of the same number of rows")
         self._kept: list[object] = [arguments, results]
@@ -48,7 +48,7 @@ class Stagewise:
             for i, array in enumerate(arguments):
                 buffer.set_arg(i, memoryview(array if array.ndim == 1 else array[k]))  # type: ignore[call-arg, arg-type]
             for i, array in enumerate(results):
-                buffer.set_res(i, memoryview(array[k]))  # type: ignore[call-arg]
+                buffer.set_res(i, memoryview(array if array.ndim == 1 else array[k]))  # type: ignore[call-arg]
             self._kept.append(buffer)
             self.calls.append(call)
 
