@@ -103,9 +103,12 @@ class Shift:
 
     def states(self, states: Array) -> Array:
         """States (N + 1, n) at the new nodes."""
-        at = states[self.node]
-        return np.asarray(at + self.fraction * (states[self.node + 1] - at))
+        at, following = states.take(self.node, axis=0), states.take(self.node + 1, axis=0)
+        following -= at
+        following *= self.fraction
+        at += following
+        return at
 
     def inputs(self, inputs: Array) -> Array:
         """Inputs (N, m) over the new intervals."""
-        return np.asarray(self.mean @ inputs)
+        return np.asarray(np.dot(self.mean, inputs))

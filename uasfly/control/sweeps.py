@@ -20,6 +20,7 @@ class RiccatiSweeps:
     """The sweeps of one quadratic program after the other; `load` it first.
 
     Attributes:
+        program: what the sweeps read; whoever fills it in place spares `load` the copies.
         free, fixed: (N, 3) for `active_set`: 1 where an input is free, 0 where it is held at `fixed`, which is else 0.
         barrier_gradient, barrier_weights: (N, 3) for `predict` and `correct`: r and R with the barrier's share.
         states: (N + 1, 8) dx, inputs: (N, 3) du: results of the last sweep; for `rollout` the inputs are its argument.
@@ -28,9 +29,10 @@ class RiccatiSweeps:
 
     def __init__(self, functions: MachineFunctions, packed_size: int, nodes: int) -> None:
         stages = functions.stages
-        jacobian, defect = np.zeros((nodes, packed_size)), np.zeros((nodes, STATES))
-        q, r = np.zeros((nodes + 1, STATES)), np.zeros((nodes, INPUTS))
-        weight_x, weight_u = np.zeros((nodes + 1, STATES)), np.zeros((nodes, INPUTS))
+        self.program = StageQp.zeros(nodes, packed_size)
+        jacobian, defect = self.program.jacobian, self.program.defect
+        q, r = self.program.state_gradient, self.program.input_gradient
+        weight_x, weight_u = self.program.state_weights, self.program.input_weights
         cost, slope = np.zeros((nodes + 1, PACKED)), np.zeros((nodes + 1, STATES))
         gain, feedforward = np.zeros((nodes, INPUTS * STATES)), np.zeros((nodes, INPUTS))
         h_ux, h_uu, h_u = (
@@ -39,7 +41,6 @@ class RiccatiSweeps:
             np.zeros((nodes, INPUTS)),
         )
         factor, cost_of_defect = np.zeros((nodes, FACTOR)), np.zeros((nodes, STATES))
-        self._data = (jacobian, defect, q, r, weight_x, weight_u)
         self._cost, self._slope = cost, slope
         self.free, self.fixed = np.ones((nodes, INPUTS)), np.zeros((nodes, INPUTS))
         self.barrier_gradient, self.barrier_weights = np.zeros((nodes, INPUTS)), np.zeros((nodes, INPUTS))
@@ -84,11 +85,19 @@ class RiccatiSweeps:
 
     def load(self, qp: StageQp) -> None:
         """Take a program's data in."""
-        data = (qp.jacobian, qp.defect, qp.state_gradient, qp.input_gradient, qp.state_weights, qp.input_weights)
-        for place, array in zip(self._data, data, strict=True):
-            place[:] = array
+        own = self.program
+        if qp is not own:
+            own.jacobian[:], own.defect[:] = qp.jacobian, qp.defect
+            own.state_gradient[:], own.input_gradient[:] = qp.state_gradient, qp.input_gradient
+            own.state_weights[:], own.input_weights[:] = qp.state_weights, qp.input_weights
         self._cost[-1, _DIAGONAL], self._slope[-1] = qp.state_weights[-1], qp.state_gradient[-1]
         self.states[0] = qp.initial
+
+    def unconstrained(self, last: int = -1) -> None:
+        """Minimum with every input free; the cost to go behind stage `last` is taken as it stands."""
+        self.gradient.fill(0.0)
+        _backward(self._free_backward, last)
+        _forward(self._free_forward)
 
     def active_set(self, held: Sequence[bool], last: int = -1) -> None:
         """Minimum with some inputs held; the cost to go behind stage `last` is taken as it stands.
@@ -97,13 +106,8 @@ class RiccatiSweeps:
             held: for each stage, whether any input is held there; the others are cheaper.
             last: where the backward part starts.
         """
-        last %= len(held)
-        self.gradient[:] = 0.0  # of what is free, at the minimum
-        if True not in held:
-            _backward(self._free_backward, last)
-            _forward(self._free_forward)
-            return
-        for k in range(last, -1, -1):
+        self.gradient.fill(0.0)  # of what is free, at the minimum
+        for k in range(last % len(held), -1, -1):
             first, then = (self._held_backward if held[k] else self._free_backward)[k]
             first()
             then()

@@ -29,22 +29,27 @@ class VirtualMachineBackend:
         work, nodes = workspace, problem.grid.nodes
         linearise, pattern = linearisation_function()
         self._problem, self._workspace = problem, workspace
-        self._qp: QpSolver = qp or RiccatiQp(machine_functions(pattern), pattern.size, nodes, options)
+        self._qp: QpSolver
+        if qp is None:
+            tailored = RiccatiQp(machine_functions(pattern), pattern.size, nodes, options)
+            self._qp, self._program = tailored, tailored.program
+        else:
+            self._qp, self._program = qp, StageQp.zeros(nodes, pattern.size)
+        self._program.state_weights[:], self._program.input_weights[:] = problem.state_weights, problem.input_weights
         self._shift: tuple[float, Shift] = (0.0, Shift.after(problem.grid, 0.0))
 
         self._lower, self._upper = (np.tile(bound, (nodes, 1)) for bound in (problem.input_lower, problem.input_upper))
 
-        # Where the plan is linearised, and what comes of it.
+        # Where the plan is linearised.
         self._states, self._inputs = np.zeros((nodes + 1, STATES)), np.zeros((nodes, INPUTS))
-        self._defect, self._jacobian = np.zeros((nodes, STATES)), np.zeros((nodes, pattern.size))
-        interval, self._yaw_rate = problem.grid.interval_s[:, None], np.zeros((nodes, 1))
+        interval, self._yaw_rate = problem.grid.interval_s[:, None], np.zeros(nodes)
         self._linearise = Stagewise(
             linearise,
             [
                 *(self._states[:-1], self._inputs, work.parameters, work.force),
-                *(work.yaw[:-1, None], self._yaw_rate, interval, self._states[1:]),
+                *(work.yaw[:-1, None], self._yaw_rate[:, None], interval, self._states[1:]),
             ],
-            [self._defect, self._jacobian],
+            [self._program.defect, self._program.jacobian],
         )
         self._trims, self._force_at_nodes = np.zeros((nodes + 1, 3)), np.zeros((nodes + 1, 3))
         self._trim = Stagewise(
@@ -79,42 +84,41 @@ class VirtualMachineBackend:
     def iterate(self, elapsed_s: float) -> SolveStatus:
         """See `Backend.iterate`."""
         work, states, inputs = self._workspace, self._states, self._inputs
-        if not (math.isfinite(elapsed_s) and work.given_is_finite() and work.references_are_finite()):
+        if not (math.isfinite(elapsed_s) and work.is_finite()):
             return SolveStatus.BAD_INPUT
         if elapsed_s > 0.0:
             if elapsed_s != self._shift[0]:
                 self._shift = (elapsed_s, Shift.after(self._problem.grid, elapsed_s))
             shift = self._shift[1]
             states[:], inputs[:] = shift.states(work.states), shift.inputs(work.inputs)
-            active = work.active[shift.nearest]
+            active = work.active.take(shift.nearest, axis=0)
         elif elapsed_s == 0.0:
             states[:], inputs[:], active = work.states, work.inputs, work.active
         else:
             states[:], inputs[:], active = work.state_reference, work.input_reference, np.zeros_like(work.active)
         states[0] = work.initial
-        qp = self._quadratic_program()
-        solution = self._qp.solve(qp, active)
-        work.figures[:3] = solution.sweeps, solution.interior_iterations, np.abs(qp.defect).max()
+        self._fill_program()
+        program = self._program
+        solution = self._qp.solve(program, active)
+        work.figures[:3] = solution.sweeps, solution.interior_iterations, np.abs(program.defect).max()
         if solution.status is SolveStatus.FAILED:
             return SolveStatus.FAILED
         np.add(states, solution.states, out=work.states)
-        np.maximum(inputs + solution.inputs, self._lower, out=work.inputs)
+        np.add(inputs, solution.inputs, out=work.inputs)
+        np.maximum(work.inputs, self._lower, out=work.inputs)
         np.minimum(work.inputs, self._upper, out=work.inputs)
         work.active[:] = solution.active
         return solution.status
 
-    def _quadratic_program(self) -> StageQp:
-        work, problem, states, inputs = self._workspace, self._problem, self._states, self._inputs
-        self._yaw_rate[:, 0] = (work.yaw[1:] - work.yaw[:-1]) / problem.grid.interval_s
+    def _fill_program(self) -> None:
+        """The program about the present plan; its initial difference stays zero."""
+        work, program, states, inputs = self._workspace, self._program, self._states, self._inputs
+        np.subtract(work.yaw[1:], work.yaw[:-1], out=self._yaw_rate)
+        np.divide(self._yaw_rate, self._problem.grid.interval_s, out=self._yaw_rate)
         self._linearise.forward()
-        return StageQp(
-            jacobian=self._jacobian,
-            defect=self._defect,
-            initial=work.initial - states[0],
-            state_gradient=problem.state_weights * (states - work.state_reference),
-            input_gradient=problem.input_weights * (inputs - work.input_reference),
-            state_weights=problem.state_weights,
-            input_weights=problem.input_weights,
-            lower=self._lower - inputs,
-            upper=self._upper - inputs,
-        )
+        np.subtract(states, work.state_reference, out=program.state_gradient)
+        np.multiply(program.state_gradient, program.state_weights, out=program.state_gradient)
+        np.subtract(inputs, work.input_reference, out=program.input_gradient)
+        np.multiply(program.input_gradient, program.input_weights, out=program.input_gradient)
+        np.subtract(self._lower, inputs, out=program.lower)
+        np.subtract(self._upper, inputs, out=program.upper)
