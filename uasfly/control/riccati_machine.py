@@ -25,11 +25,13 @@ class MachineFunctions:
 
     Attributes:
         stages: of which `backward` and `barrier_backward` take two products, as vectors, before all other arguments.
+        free_backward: `barrier_backward` without the results for `barrier_vector`, -> (P, p, K, k).
         products: (P, p, J, c) -> the products (JOINT,) and (PRODUCTS,) for `barrier_backward`.
         products_with_held: (P, p, J, c, fixed) -> those for `backward`.
     """
 
     stages: StageFunctions
+    free_backward: ca.Function
     products: ca.Function
     products_with_held: ca.Function
 
@@ -51,8 +53,11 @@ def machine_functions(pattern: JacobianPattern) -> MachineFunctions:
         joint = ca.horzcat(ca.densify(hessian @ columns), ca.mac(hessian, defect, slope))
         return [ca.vec(joint), ca.vec(ca.densify(joint.T @ columns))]  # quickest with the sparse factor on the right
 
+    stages = stage_functions(pattern, products_given=True)
+    given = stages.barrier_backward.sx_in()
     return MachineFunctions(
-        stage_functions(pattern, products_given=True),
+        stages,
+        ca.Function("uasfly_free_backward", given, stages.barrier_backward.call(given)[:4], {"cse": True}),
         ca.Function("uasfly_products", arguments, products(defect)),
         ca.Function("uasfly_products_with_held", [*arguments, fixed], products(defect + columns[:, -INPUTS:] @ fixed)),
     )

@@ -62,14 +62,16 @@ class RiccatiSweeps:
             [after, self.inputs, self.gradient],
         )
 
-        def barrier_backward(gradient: Array, weights: Array) -> Stagewise:
-            return Stagewise(
-                stages.barrier_backward,
-                [*given, *behind, *linear, q[:-1], gradient, weight_x[:-1], weights],
-                [*here, gain, feedforward, factor, cost_of_defect],
-            )
-
-        free, barrier = barrier_backward(r, weight_u), barrier_backward(self.barrier_gradient, self.barrier_weights)
+        free = Stagewise(
+            functions.free_backward,
+            [*given, *behind, *linear, q[:-1], r, weight_x[:-1], weight_u],
+            [*here, gain, feedforward],
+        )
+        barrier = Stagewise(
+            stages.barrier_backward,
+            [*given, *behind, *linear, q[:-1], self.barrier_gradient, weight_x[:-1], self.barrier_weights],
+            [*here, gain, feedforward, factor, cost_of_defect],
+        )
         free_forward = Stagewise(stages.barrier_forward, [before, *linear, gain, feedforward], [after, self.inputs])
         self._free_backward = _in_turn(free_products, free)
         self._held_backward = _in_turn(held_products, held)

@@ -10,11 +10,12 @@ from uasfly.control.grid import Shift
 from uasfly.control.problem import Problem
 from uasfly.control.qp import QpOptions, QpSolver, SolveStatus, StageQp
 from uasfly.control.qp_riccati import RiccatiQp
-from uasfly.control.references import input_reference_function, trim_function
+from uasfly.control.references import reference_stage_function
 from uasfly.control.riccati_machine import machine_functions
 from uasfly.control.stagewise import Stagewise
 from uasfly.control.transcription import linearisation_function
 from uasfly.control.workspace import Workspace
+from uasfly.messages import Array
 from uasfly.model import INPUTS, STATES
 
 
@@ -51,34 +52,29 @@ class VirtualMachineBackend:
             ],
             [self._program.defect, self._program.jacobian],
         )
-        self._trims, self._force_at_nodes = np.zeros((nodes + 1, 3)), np.zeros((nodes + 1, 3))
-        self._trim = Stagewise(
-            trim_function(),
-            [
-                *(work.acceleration, work.velocity, work.yaw[:, None]),
-                *(self._force_at_nodes, work.parameters, work.limits),
-            ],
-            [self._trims],
-        )
-        self._input_reference = Stagewise(
-            input_reference_function(),
-            [
-                *(self._trims[:-1], self._trims[1:], work.parameters),
-                *(interval, problem.input_lower, problem.input_upper),
-            ],
-            [work.input_reference],
-        )
+        # A trim is handed on from the end to the start; at the end there is no interval, and so no input reference.
+        trims, none = np.zeros((nodes + 2, 3)), np.zeros((1, INPUTS))
+
+        def references(at: slice, force: Array, interval: Array, inputs: Array) -> Stagewise:
+            after = slice(at.start + 1, at.stop + 1)
+            motion = [work.acceleration[at], work.velocity[at], work.position[at], work.yaw[at, None]]
+            limits = [work.limits, interval, problem.input_lower, problem.input_upper]
+            return Stagewise(
+                reference_stage_function(),
+                [trims[after], *motion, force, work.parameters, *limits],
+                [trims[at], work.state_reference[at], inputs],
+            )
+
+        self._last_reference = references(slice(nodes, nodes + 1), work.force[-1:], interval[-1:], none)
+        self._references = references(slice(0, nodes), work.force, interval, work.input_reference)
 
     def references(self) -> SolveStatus:
         """See `Backend.references`."""
         work = self._workspace
         if not work.given_is_finite():
             return SolveStatus.BAD_INPUT
-        self._force_at_nodes[:-1], self._force_at_nodes[-1] = work.force, work.force[-1]
-        self._trim.forward()
-        self._input_reference.forward()
-        work.state_reference[:, :3], work.state_reference[:, 3:6] = work.position, work.velocity
-        work.state_reference[:, 6:] = self._trims[:, :2]
+        self._last_reference.forward()
+        self._references.backward()
         return SolveStatus.CONVERGED
 
     def iterate(self, elapsed_s: float) -> SolveStatus:
