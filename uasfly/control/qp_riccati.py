@@ -78,13 +78,17 @@ class RiccatiQp:
                 work.active_set(np.logical_or.reduce(at_bound, axis=1).tolist(), last)
             else:
                 work.unconstrained(last)
-            following = (inputs > greatest).view(np.int8) - (inputs < least).view(np.int8)  # 0 for what is held
+            above, below = inputs > greatest, inputs < least  # neither for what is held
+            if not (any_held or np.count_nonzero(above | below)):
+                return active, 0, sweep
+            following = above.view(np.int8) - below.view(np.int8)
             if any_held:
                 following += np.where(active * gradient > tolerance, 0, active)
             changed = following != active
-            active, changes = following, np.count_nonzero(changed)
+            active, changes = following, int(np.count_nonzero(changed))
             if not changes or (changes >= before and changes > MANY * qp.nodes):
                 return active, changes, sweep
             before = changes
-            last = int(np.flatnonzero(changed)[-1]) // active.shape[1]  # behind this stage the cost to go is what it was
+            # Behind this stage the cost to go is what it was.
+            last = int(np.flatnonzero(changed)[-1]) // active.shape[1]
         return active, changes, most

@@ -108,6 +108,38 @@ class _Factor:
         return ca.vertcat(*rows)
 
 
+@dataclass(frozen=True, slots=True)
+class _Ahead:
+    """The cost to go behind a stage, by what the stage has in hand: dx and du, with W for [A B] from roll on.
+
+    Attributes:
+        xx, ux, uu: blocks of [A B]' P [A B]. x, u: parts of [A B]' slope. slope: P c + p.
+    """
+
+    xx: ca.SX
+    ux: ca.SX
+    uu: ca.SX
+    x: ca.SX
+    u: ca.SX
+    slope: ca.SX
+
+    @classmethod
+    def of_defect(cls, hessian: ca.SX, slope: ca.SX, jacobian: ca.SX, defect: ca.SX) -> _Ahead:
+        last = jacobian[:, ROLL:]
+        joint = ca.horzcat(hessian @ last, hessian @ defect + slope)
+        return cls.of(hessian, jacobian, joint, joint.T @ last)
+
+    @classmethod
+    def of(cls, hessian: ca.SX, jacobian: ca.SX, joint: ca.SX, products: ca.SX) -> _Ahead:
+        """From Y = [P W, P c + p] and Y' W."""
+        first, tilt, slope = jacobian[:, :ROLL], STATES - ROLL, joint[:, -1]
+        mixed, square, of_last = first.T @ joint[:, :-1], products[:-1, :], products[-1, :].T
+        corner = mixed[:, :tilt]
+        xx = ca.blockcat([[first.T @ (hessian @ first), corner], [corner.T, square[:tilt, :tilt]]])
+        ux, uu = ca.horzcat(mixed[:, tilt:].T, square[:tilt, tilt:].T), square[tilt:, tilt:]
+        return cls(xx, ux, uu, ca.vertcat(first.T @ slope, of_last[:tilt]), of_last[tilt:], slope)
+
+
 def stage_functions(pattern: JacobianPattern, *, products_given: bool = False) -> StageFunctions:
     """The stage functions for a Jacobian pattern.
 
@@ -131,27 +163,16 @@ def stage_functions(pattern: JacobianPattern, *, products_given: bool = False) -
     jacobian = pattern.symbolic(packed)
     a, b = jacobian[:, :STATES], jacobian[:, STATES:]
 
-    hessian = _symmetric(cost, STATES)
-    first, last = jacobian[:, :ROLL], jacobian[:, ROLL:]  # position and velocity; tilt and inputs
-    carried, ahead, ahead_of_held = hessian @ last, hessian @ defect + slope, hessian @ (defect + b @ fixed) + slope
-    products, given = ca.SX(), []
+    hessian, last = _symmetric(cost, STATES), jacobian[:, ROLL:]
+    given: list[ca.SX] = []
     if products_given:
         width = last.shape[1]
         given = [symbol("Y", STATES * (width + 1)), symbol("YW", (width + 1) * width)]
         joint, products = ca.reshape(given[0], STATES, width + 1), ca.reshape(given[1], width + 1, width)
-        carried, ahead, ahead_of_held = joint[:, :-1], joint[:, -1], joint[:, -1]
-    square = products[:-1, :] if products_given else last.T @ carried
-    mixed, tilt = first.T @ carried, STATES - ROLL
-    corner = mixed[:, :tilt]
-    h_xx = ca.diag(weight_x) + ca.blockcat(
-        [[first.T @ (hessian[:, :ROLL] @ first[:ROLL, :]), corner], [corner.T, square[:tilt, :tilt]]]
-    )
-    h_ux, h_uu = ca.horzcat(mixed[:, tilt:].T, square[:tilt, tilt:].T), ca.diag(weight_u) + square[tilt:, tilt:]
-
-    def gradients(ahead: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """[A B]' ahead, the part of the states and that of the inputs."""
-        of_last = products[-1, :].T if products_given else last.T @ ahead
-        return ca.vertcat(first.T @ ahead, of_last[:tilt]), of_last[tilt:]
+        plain = with_held = _Ahead.of(hessian, jacobian, joint, products)
+    else:
+        plain, with_held = (_Ahead.of_defect(hessian, slope, jacobian, c) for c in (defect, defect + b @ fixed))
+    h_xx, h_ux, h_uu = ca.diag(weight_x) + plain.xx, plain.ux, ca.diag(weight_u) + plain.uu
 
     def eliminate(uu: ca.SX, ux: ca.SX, u: ca.SX, x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, _Factor]:
         factor = _Factor.of(uu)
@@ -168,16 +189,14 @@ def stage_functions(pattern: JacobianPattern, *, products_given: bool = False) -
     for i in range(INPUTS):
         for k in range(INPUTS):
             masked[i, k] = free[i] * free[k] * h_uu[i, k] if i != k else free[i] * h_uu[i, i] + (1.0 - free[i])
-    gradient_x, gradient_u = gradients(ahead_of_held)
-    h_u = r + weight_u * fixed + gradient_u
-    p_next, s_next, big_k, small_k, _ = eliminate(masked, ca.diag(free) @ h_ux, free * h_u, q + gradient_x)
+    h_u = r + weight_u * fixed + with_held.u
+    p_next, s_next, big_k, small_k, _ = eliminate(masked, ca.diag(free) @ h_ux, free * h_u, q + with_held.x)
     arguments = [*given, cost, slope, packed, defect, q, r, weight_x, weight_u]
     results = [p_next, s_next, big_k, small_k, ca.vec(h_ux), upper_triangle(h_uu), h_u]
     backward = _function("uasfly_backward", [*arguments, free, fixed], results)
 
-    gradient_x, gradient_u = gradients(ahead)
-    p_next, s_next, big_k, small_k, factor = eliminate(h_uu, h_ux, r + gradient_u, q + gradient_x)
-    results = [p_next, s_next, big_k, small_k, factor.packed(), ahead - slope]
+    p_next, s_next, big_k, small_k, factor = eliminate(h_uu, h_ux, r + plain.u, q + plain.x)
+    results = [p_next, s_next, big_k, small_k, factor.packed(), plain.slope - slope]
     barrier_backward = _function("uasfly_barrier_backward", arguments, results)
 
     stored, stored_cost = symbol("factor", FACTOR), symbol("Pc", STATES)

@@ -46,9 +46,9 @@ class Stagewise:
         for k in range(stages):
             buffer, call = function.buffer()
             for i, array in enumerate(arguments):
-                buffer.set_arg(i, memoryview(array if array.ndim == 1 else array[k]))  # type: ignore[call-arg, arg-type]
+                buffer.set_arg(i, _row(array, k))  # type: ignore[call-arg]
             for i, array in enumerate(results):
-                buffer.set_res(i, memoryview(array if array.ndim == 1 else array[k]))  # type: ignore[call-arg]
+                buffer.set_res(i, _row(array, k))  # type: ignore[call-arg]
             self._kept.append(buffer)
             self.calls.append(call)
 
@@ -61,6 +61,11 @@ class Stagewise:
         """Evaluate from stage `last` down to the first."""
         for call in self.calls[last::-1]:
             call()
+
+
+def _row(array: Array, k: int) -> memoryview:
+    row: Array = array if array.ndim == 1 else array[k]
+    return memoryview(row)  # type: ignore[arg-type]
 
 
 def _check(name: str, array: Array, sparsity: ca.Sparsity) -> None:

@@ -10,7 +10,6 @@ from uasfly.control.qp import StageQp
 from uasfly.control.riccati import FACTOR, PACKED, PACKED_INPUTS
 from uasfly.control.riccati_machine import JOINT, PRODUCTS, MachineFunctions
 from uasfly.control.stagewise import Stagewise
-from uasfly.messages import Array
 from uasfly.model import INPUTS, STATES
 
 _DIAGONAL = np.cumsum(np.arange(1, STATES + 1)) - 1  # places of P's diagonal in its packed triangle

@@ -86,7 +86,8 @@ class VirtualMachineBackend:
             if elapsed_s != self._shift[0]:
                 self._shift = (elapsed_s, Shift.after(self._problem.grid, elapsed_s))
             shift = self._shift[1]
-            states[:], inputs[:] = shift.states(work.states), shift.inputs(work.inputs)
+            shift.states(work.states, out=states)
+            shift.inputs(work.inputs, out=inputs)
             active = work.active.take(shift.nearest, axis=0)
         elif elapsed_s == 0.0:
             states[:], inputs[:], active = work.states, work.inputs, work.active
