@@ -23,7 +23,7 @@ class RiccatiSweeps:
         free, fixed: (N, 3) for `active_set`: 1 where an input is free, 0 where it is held at `fixed`, which is else 0.
         barrier_gradient, barrier_weights: (N, 3) for `predict` and `correct`: r and R with the barrier's share.
         states: (N + 1, 8) dx, inputs: (N, 3) du: results of the last sweep; for `rollout` the inputs are its argument.
-        gradient: (N, 3) of the cost by du after `active_set`.
+        gradient: (N, 3) of the cost by du after `active_set` and `unconstrained`.
     """
 
     def __init__(self, functions: MachineFunctions, packed_size: int, nodes: int) -> None:
@@ -96,7 +96,7 @@ class RiccatiSweeps:
 
     def unconstrained(self, last: int = -1) -> None:
         """Minimum with every input free; the cost to go behind stage `last` is taken as it stands."""
-        self.gradient.fill(0.0)
+        self.gradient.fill(0.0)  # at the minimum
         _backward(self._free_backward, last)
         _forward(self._free_forward)
 
