@@ -140,7 +140,9 @@ class ObserverNoise(FileModel):
 
     acceleration_density: Annotated[Positive, Field(description="[m/s^2/sqrt(Hz)] unmodelled acceleration")]
     attitude_density: Annotated[Positive, Field(description="[rad/s/sqrt(Hz)] gyro noise")]
-    force_density: Annotated[Positive, Field(description="[m/s^2/sqrt(s)] random walk of the wind force")]
+    force_density: Annotated[
+        Positive, Field(description="[m/s^2/sqrt(s)] random walk of the wind force; up to 3 times that in gusts")
+    ]
     gnss_bias_density: Annotated[Positive, Field(description="[m/sqrt(s)] random walk of the GNSS bias")]
     velocity_wander_m_s: Annotated[
         NonNegative, Field(description="sigma of the slow error of PX4's velocity, on each axis")

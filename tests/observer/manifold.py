@@ -88,8 +88,8 @@ def flying_inputs(rng: np.random.Generator, dt_s: float) -> Array:
     inputs[s.IN_RATE] = 2.0 * rng.standard_normal(3)
     inputs[s.IN_AIRBORNE] = 1.0
     inputs[s.IN_BIAS_DENSITY] = 0.3**2
-    inputs[s.IN_FORCE_DENSITY] = 0.5**2
-    inputs[s.IN_ACCELERATION_DENSITY] = 0.1**2
+    inputs[s.IN_FORCE_DENSITY] = (0.5**2, 0.3**2, 1.2**2)
+    inputs[s.IN_ACCELERATION_DENSITY] = (0.1**2, 0.05**2, 0.3**2)
     inputs[s.IN_ATTITUDE_DENSITY] = 0.02**2
     inputs[s.IN_DRAG] = (0.26, 0.2, 0.1)
     inputs[s.IN_WANDER_RATE] = 0.5

@@ -53,7 +53,7 @@ def densities(inputs: Array) -> Array:
         inputs[s.IN_VELOCITY_WANDER_DENSITY],
         inputs[s.IN_ATTITUDE_WANDER_DENSITY],
     )
-    return np.diag(np.repeat(parts, 3))
+    return np.diag(np.concatenate([np.broadcast_to(part, 3) for part in parts]))
 
 
 @pytest.mark.parametrize("angle_rad", [0.0, 1e-9, 1e-3, 0.3, 1.0])

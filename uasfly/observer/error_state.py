@@ -180,9 +180,9 @@ def noise_covariance(core: ca.SX, inputs: ca.SX, order: int = 5) -> ca.SX:
     """
     densities = ca.vertcat(
         ca.SX(3, 1),
-        ca.repmat(inputs[s.IN_ACCELERATION_DENSITY], 3, 1),
+        inputs[s.IN_ACCELERATION_DENSITY],
         ca.repmat(inputs[s.IN_ATTITUDE_DENSITY], 3, 1),
-        ca.repmat(inputs[s.IN_FORCE_DENSITY], 3, 1),
+        inputs[s.IN_FORCE_DENSITY],
         ca.repmat(inputs[s.IN_BIAS_DENSITY], 3, 1),
         ca.repmat(inputs[s.IN_VELOCITY_WANDER_DENSITY], 3, 1),
         ca.repmat(inputs[s.IN_ATTITUDE_WANDER_DENSITY], 3, 1),

@@ -10,6 +10,7 @@ import numpy as np
 from uasfly.messages import Array
 from uasfly.observer import states as s
 from uasfly.observer.door import Odometry, Sighting
+from uasfly.observer.gusts import Gusts
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +28,7 @@ class Moment:
         odometry_s: last odometry sample.
         sighted_s: last accepted sighting of each marker.
         measured: what was measured here; None for a mere prediction.
+        gusts: how they were up to here.
     """
 
     time_s: float
@@ -39,6 +41,7 @@ class Moment:
     odometry_s: float
     sighted_s: tuple[float, ...]
     measured: Odometry | Sighting | None
+    gusts: Gusts
 
     @property
     def layout(self) -> s.Layout:

@@ -88,32 +88,32 @@ IN_THRUST = 1  # m/s^2, mean over dt, along the body z axis
 IN_RATE = slice(2, 5)  # rad/s, body, mean over dt
 IN_AIRBORNE = 5  # 1 in the air, 0 on the ground
 IN_BIAS_DENSITY = 6  # m^2/s
-IN_FORCE_DENSITY = 7  # m^2/s^4/s
-IN_ACCELERATION_DENSITY = 8  # m^2/s^4/Hz
-IN_ATTITUDE_DENSITY = 9  # rad^2/s^2/Hz
-IN_DRAG = slice(10, 13)  # 1/s
-IN_WANDER_RATE = 13  # 1/s, at which the wanders forget themselves
-IN_VELOCITY_WANDER_DENSITY = 14  # m^2/s^2/s
-IN_ATTITUDE_WANDER_DENSITY = 15  # rad^2/s
-PREDICTION_INPUTS = 16
-IN_MOTION = slice(0, 10)  # all but the drag
+IN_ATTITUDE_DENSITY = 7  # rad^2/s^2/Hz
+IN_FORCE_DENSITY = slice(8, 11)  # m^2/s^4/s, world axes
+IN_ACCELERATION_DENSITY = slice(11, 14)  # m^2/s^4/Hz, world axes
+IN_DRAG = slice(14, 17)  # 1/s
+IN_WANDER_RATE = 17  # 1/s, at which the wanders forget themselves
+IN_VELOCITY_WANDER_DENSITY = 18  # m^2/s^2/s
+IN_ATTITUDE_WANDER_DENSITY = 19  # rad^2/s
+PREDICTION_INPUTS = 20
+IN_MOTION = slice(0, 14)  # all but the drag
 
 # Further input of an odometry step.
-IN_QUATERNION = slice(16, 20)  # measured, body to world
-IN_POSITION = slice(20, 23)  # m, measured
-IN_VELOCITY = slice(23, 26)  # m/s, measured, world
-IN_USE = slice(26, 29)  # 1 = the sensor has something to say, in the order of SENSORS
-IN_CORRELATION = slice(29, 32)  # factor on the variance for the correlation in time, in the order of SENSORS
-IN_VARIANCE = slice(32, 35)  # configured variances (rad^2, m^2, m^2/s^2)
-IN_INTERVAL = 35  # s since the sample before
-IN_MATCHING_WEIGHT = 36  # 0..1, weight of this innovation in the matched covariance
-IN_MEAN_WEIGHT = 37  # 0..1, weight of this innovation in the mean innovation
-IN_BIAS_FREE = 38  # 1 while the GNSS bias may change: a marker makes it observable, or GNSS runs away; else 0
-IN_WANDER_FREE = 39  # 1 while a marker makes the velocity's wander observable, else 0
-IN_AGREES = 40  # 1 while measured position and velocity tell the same motion, else 0
-ODOMETRY_INPUTS = 41
-IN_MEASURED = slice(16, 32)  # quaternion, position, velocity, use, correlation
-IN_WEIGHTS = slice(35, 41)  # interval, matching weight, mean weight, bias free, wander free, agrees
+IN_QUATERNION = slice(20, 24)  # measured, body to world
+IN_POSITION = slice(24, 27)  # m, measured
+IN_VELOCITY = slice(27, 30)  # m/s, measured, world
+IN_USE = slice(30, 33)  # 1 = the sensor has something to say, in the order of SENSORS
+IN_CORRELATION = slice(33, 36)  # factor on the variance for the correlation in time, in the order of SENSORS
+IN_VARIANCE = slice(36, 39)  # configured variances (rad^2, m^2, m^2/s^2)
+IN_INTERVAL = 39  # s since the sample before
+IN_MATCHING_WEIGHT = 40  # 0..1, weight of this innovation in the matched covariance
+IN_MEAN_WEIGHT = 41  # 0..1, weight of this innovation in the mean innovation
+IN_BIAS_FREE = 42  # 1 while the GNSS bias may change: a marker makes it observable, or GNSS runs away; else 0
+IN_WANDER_FREE = 43  # 1 while a marker makes the velocity's wander observable, else 0
+IN_AGREES = 44  # 1 while measured position and velocity tell the same motion, else 0
+ODOMETRY_INPUTS = 45
+IN_MEASURED = slice(20, 36)  # quaternion, position, velocity, use, correlation
+IN_WEIGHTS = slice(39, 45)  # interval, matching weight, mean weight, bias free, wander free, agrees
 
 # Output of an odometry step beside the new packed state.
 OUT_NIS = slice(0, 3)  # normalised innovation squared

@@ -16,6 +16,7 @@ from uasfly.messages import Array
 from uasfly.observer import functions
 from uasfly.observer import states as s
 from uasfly.observer.door import Odometry, Sighting
+from uasfly.observer.gusts import AS_CONFIGURED, Gusts
 from uasfly.observer.markers import MarkerAlgebra
 from uasfly.observer.moment import Moment, Verdict
 from uasfly.observer.thrust import ThrustHistory
@@ -31,6 +32,7 @@ MARKER_FRESH_S = 20.0
 MEAN_TIME_S = 0.25  # time constant of the mean innovation that tells a jump from noise
 RUNAWAY_DENSITY = 0.5  # m/sqrt(s), walk of the GNSS bias while GNSS runs away
 _NO_RATE = (0.0, 0.0, 0.0)
+_GROUND_NOISE = (0.0,) * 3 + (GROUND_ACCELERATION_DENSITY**2,) * 3
 SHORTEST_INTERVAL_S = 1e-3  # between samples
 LONGEST_INTERVAL_S = 0.1  # a sample after a pause weighs no more in the matching than after this
 
@@ -116,14 +118,14 @@ class Stepper:
         packed[layout.covariance] = P.ravel()
         packed[layout.matched] = np.concatenate([np.eye(3).ravel() * variance for variance in variances])
         rate, time_s = tuple(odometry.rate or (0.0, 0.0, 0.0)), odometry.time_s
-        return Moment(time_s, packed, (), (), airborne, rate, time_s, time_s, (), odometry)
+        return Moment(time_s, packed, (), (), airborne, rate, time_s, time_s, (), odometry, AS_CONFIGURED)
 
     def advance(
         self, before: Moment, time_s: float, measured: Odometry | Sighting | None, airborne: bool
     ) -> tuple[Moment, tuple[Verdict, ...]]:
         """The moment at `time_s` >= `before.time_s`, with what the gates said of the measurement there."""
         if airborne != before.airborne:
-            before = replace(before, packed=_without_force(before), airborne=airborne)
+            before = replace(before, packed=_without_force(before), airborne=airborne, gusts=AS_CONFIGURED)
         if isinstance(measured, Odometry):
             return self._odometry(before, measured)
         moved = replace(before, time_s=time_s, packed=self._predicted(before, time_s, before.rate), measured=measured)
@@ -145,10 +147,12 @@ class Stepper:
             *(rate if known else _NO_RATE),
             moment.airborne,
             max(noise.gnss_bias_density, RUNAWAY_DENSITY if self.bias_free else 0.0) ** 2,
-            noise.force_density**2 if moment.airborne else 0.0,
-            noise.acceleration_density**2 if moment.airborne else GROUND_ACCELERATION_DENSITY**2,
             noise.attitude_density**2 if known else UNKNOWN_TURN_DENSITY**2,
+            *(self._motion_noise(moment.gusts) if moment.airborne else _GROUND_NOISE),
         )
+
+    def _motion_noise(self, gusts: Gusts) -> tuple[float, ...]:
+        return gusts.motion_noise(self._noise.force_density, self._noise.acceleration_density)
 
     @staticmethod
     def _sees_a_marker(moment: Moment, time_s: float) -> bool:
@@ -215,8 +219,17 @@ class Stepper:
             time_s,
             before.sighted_s,
             odometry,
+            self._gusts(before, time_s, result, odometry),
         )
         return moment, verdicts
+
+    def _gusts(self, before: Moment, time_s: float, packed: Array, odometry: Odometry) -> Gusts:
+        """What is known of the gusts after a step; a velocity that model and position deny says nothing of them."""
+        denied = odometry.use[s.VELOCITY_SENSOR] and self._outputs[s.OUT_ACCEPTED][s.VELOCITY_SENSOR] < 0.5
+        if not before.airborne or (denied and not self.agrees):
+            return before.gusts
+        x, y, z = packed[s.FORCE].tolist()
+        return before.gusts.after(time_s, (x, y, z), self._noise.force_density)
 
     def _factors(self, interval_s: float, velocity_factor: float) -> tuple[float, ...]:
         """Factors on the variances of attitude, position and velocity."""
