@@ -369,6 +369,7 @@ class Status:
         marker_age_s: of the last sighting of the marker that the mission hangs on; NaN without one.
         waits_for: what the vehicle waits for, in offboard, before the legs can begin; "" for nothing.
         wind: None on the ground, and until it is known.
+        thrust_trim: share by which the thrust is more (negative: less) than airframe file and voltage say.
     """
 
     time_s: float
@@ -394,3 +395,4 @@ class Status:
     marker_age_s: float = math.nan
     waits_for: str = ""
     wind: WindEstimate | None = None
+    thrust_trim: float = 0.0

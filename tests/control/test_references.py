@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.control.vehicle import f550
-from uasfly.control.references import input_reference_function, trim_function
+from uasfly.control.references import input_reference_function, reference_stage_function, trim_function
 from uasfly.control.transcription import interval_function
 from uasfly.messages import Array
 from uasfly.model import INPUTS, PARAMETERS, STATES, controller_dynamics, controller_parameters
@@ -109,3 +109,19 @@ def test_input_references_stay_inside_the_bounds() -> None:
         input_reference_function()((-0.4, 0.4, 0.1), (0.4, -0.4, 0.1), parameters, 0.02, lower, upper)
     ).ravel()
     np.testing.assert_allclose(inputs, (0.15, 0.5, -0.5))
+
+
+def test_the_stage_function_is_trim_and_input_reference_in_one() -> None:
+    """To the last digits, with the state reference put together from position, velocity and tilt."""
+    rng, parameters = np.random.default_rng(3), controller_parameters(MODEL, np.zeros(3), 28.54209)
+    lower, upper = np.array((0.15, -0.5, -0.5)), np.array((0.75, 0.5, 0.5))
+    for _ in range(5):
+        end, acceleration, velocity, position, force = rng.normal(size=(5, 3)) * (0.1, 0.2, 0.3)
+        yaw, interval = rng.uniform(-3.0, 3.0), rng.uniform(0.02, 0.3)
+        given = (end, acceleration, velocity, position, yaw, force, parameters, LIMITS, interval, lower, upper)
+        results = [np.asarray(result).ravel() for result in reference_stage_function().call(list(given))]
+        trim = _trim(acceleration, velocity, yaw, force)
+        inputs = input_reference_function()(trim, end, parameters, interval, lower, upper)
+        expected = (trim, np.concatenate((position, velocity, trim[:2])), np.asarray(inputs).ravel())
+        for result, other in zip(results, expected, strict=True):
+            np.testing.assert_allclose(result, other, atol=1e-14)

@@ -30,6 +30,18 @@ def test_backward_may_start_in_the_middle() -> None:
     np.testing.assert_array_equal(carried[:, 0], [11, 9, 7, 7, 7])
 
 
+def test_a_result_may_be_one_for_all_stages() -> None:
+    """What one function leaves there, another may take before the next stage writes over it; the last stage's stays."""
+    own, carried, passing, doubled = np.arange(8.0).reshape(4, 2), np.zeros((4, 1)), np.zeros(1), np.zeros((4, 1))
+    first = Stagewise(SUM, [carried, own, np.ones(1)], [passing])
+    then = Stagewise(SUM, [passing, np.zeros((4, 2)), np.ones(1)], [doubled])
+    for one, other in zip(first.calls, then.calls, strict=True):
+        one()
+        other()
+    np.testing.assert_array_equal(doubled[:, 0], [1, 5, 9, 13])
+    assert passing[0] == 13
+
+
 @pytest.mark.parametrize(
     "own",
     [

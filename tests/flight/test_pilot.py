@@ -77,6 +77,10 @@ class FakeObserver:
         """Check what the filter would divide by."""
         assert k_thrust_m_s2 > 0.0
 
+    def correct_thrust(self, ratio: float) -> None:
+        """Check what the filter would multiply by."""
+        assert ratio > 0.0
+
     def take_moved(self) -> list[tuple[int, float]]:
         """Nothing moves."""
         return []
@@ -111,6 +115,10 @@ class FakeController:
     def k_thrust_m_s2(self, battery_voltage_v: float | None) -> float:
         """Any."""
         return 28.5
+
+    def trim_thrust(self, trim: float) -> float:
+        """Take none."""
+        return 0.0
 
     def reset(self, time_s: float, setpoint: Setpoint | None) -> None:
         """Remember."""

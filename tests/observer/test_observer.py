@@ -8,7 +8,7 @@ import pytest
 from tests.observer.airframes import F550_NOISE, f550
 from tests.observer.recorded import flying_observer, recording
 from uasfly.airframe import GRAVITY_M_S2
-from uasfly.frames import quaternion_from_euler
+from uasfly.frames import quaternion_from_euler, rotation_matrix
 from uasfly.messages import (
     Array,
     AttitudeTargetSample,
@@ -201,6 +201,36 @@ def test_a_lower_k_thrust_explains_a_sagging_battery() -> None:
         forces.append(estimated(observer, 3.0).force_in_world[2])
     assert forces[0] == pytest.approx(0.0, abs=0.01)
     assert forces[1] == pytest.approx(-GRAVITY_M_S2 / 9.0, abs=0.02)
+
+
+def test_corrected_thrust_goes_into_the_force_and_nothing_else_moves() -> None:
+    """10 % less, hovering against wind: the force follows at once, along the thrust, and stays; so does all else."""
+    tilted, observers, k_thrust = quaternion_from_euler(0.1, -0.2, 0.7), [], 28.54209
+    along = rotation_matrix(tilted)[:, 2]
+    for corrected in (False, True):
+        observer = Observer(f550())
+        observers.append(observer)
+        observer.add(in_air())
+        observer.sent(setpoint(-1.0, 0.37), in_offboard=True)
+        for k in range(250):
+            if corrected and k == 200:
+                before = estimated(observer, 1.99)
+                observer.correct_thrust(0.9)
+                observer.set_k_thrust(0.9 * k_thrust)
+                after = estimated(observer, 1.99)
+            if k == 210:
+                observer.sent(setpoint(2.1, 0.37), in_offboard=True)
+            if k not in (190, 200):
+                observer.add(odometry(0.01 * k, quaternion=tilted))
+            if k in (202, 205):  # late ones, from before the correction and after it
+                observer.add(odometry(1.9 if k == 202 else 2.0, quaternion=tilted))
+    shift = 0.1 * 0.37 * k_thrust * along
+    assert after.force_in_world - before.force_in_world == pytest.approx(shift, abs=1e-4)
+    plain, corrected_ = (estimated(observer, 2.52) for observer in observers)
+    for name in ("position_in_world", "velocity_in_world", "quaternion_body_to_world"):
+        assert getattr(corrected_, name) == pytest.approx(getattr(plain, name), abs=1e-6)
+        assert getattr(after, name) == pytest.approx(getattr(before, name), abs=1e-12)
+    assert corrected_.force_in_world - plain.force_in_world == pytest.approx(shift, abs=1e-3)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -1.0, 0.0])

@@ -69,3 +69,16 @@ def test_thrust_acts_after_its_own_delay() -> None:
         history.add(1.0, 12.0)
         assert history.mean(1.0, 1.0 + expected) == pytest.approx(GRAVITY_M_S2)
         assert history.mean(1.0 + expected, 2.0) == pytest.approx(12.0)
+
+
+def test_a_correction_rescales_what_was_commanded_and_not_what_comes() -> None:
+    """Nor what is assumed before the first command."""
+    history = ThrustHistory(0.0, 9.8)
+    history.add(1.0, 10.0)
+    history.rescale(0.9)
+    history.add(2.0, 12.0)
+    assert history.mean(0.0, 0.5) == pytest.approx(9.8)
+    assert history.mean(1.0, 1.5) == pytest.approx(9.0)
+    assert history.mean(1.5, 2.5) == pytest.approx(0.5 * (9.0 + 12.0))
+    history.rescale(1.0 / 0.9)
+    assert history.mean(1.0, 1.5) == pytest.approx(10.0)

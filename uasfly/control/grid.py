@@ -101,11 +101,13 @@ class Shift:
         nearest = np.clip(np.searchsorted(time, middle, side="right") - 1, 0, last)
         return cls(node, fraction[:, None], mean, nearest)
 
-    def states(self, states: Array) -> Array:
-        """States (N + 1, n) at the new nodes."""
-        at = states[self.node]
-        return np.asarray(at + self.fraction * (states[self.node + 1] - at))
+    def states(self, states: Array, out: Array | None = None) -> Array:
+        """States (N + 1, n) at the new nodes, into `out` where there is one."""
+        at, following = states.take(self.node, axis=0), states.take(self.node + 1, axis=0)
+        following -= at
+        following *= self.fraction
+        return np.asarray(np.add(at, following, out=out))
 
-    def inputs(self, inputs: Array) -> Array:
-        """Inputs (N, m) over the new intervals."""
-        return np.asarray(self.mean @ inputs)
+    def inputs(self, inputs: Array, out: Array | None = None) -> Array:
+        """Inputs (N, m) over the new intervals, into `out` where there is one."""
+        return np.asarray(np.dot(self.mean, inputs, out=out))

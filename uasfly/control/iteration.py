@@ -54,7 +54,7 @@ def make_backend(
     except NativeUnavailableError as reason:
         if choice == "c":
             raise
-        text = f"solver runs in CasADi's virtual machine, about ten times slower than compiled: {reason}"
+        text = f"solver runs in CasADi's virtual machine, about seven times slower than compiled: {reason}"
         return VirtualMachineBackend(problem, workspace, options), text
 
 

@@ -79,6 +79,11 @@ class NmpcController:
         """See `Controller.k_thrust_m_s2`."""
         return self._thrust_map.k_thrust_m_s2(battery_voltage_v)
 
+    def trim_thrust(self, trim: float) -> float:
+        """See `Controller.trim_thrust`."""
+        self._thrust_map.trim = trim
+        return trim
+
     def reset(self, time_s: float, setpoint: Setpoint | None) -> None:  # noqa: ARG002 - the protocol's signature
         """Take over: the prediction starts from `setpoint` acting, the yaw setpoint from its yaw, the plan anew."""
         self.solver.drop_plan()

@@ -44,6 +44,10 @@ class PidController:
         """See `Controller.k_thrust_m_s2`."""
         return self._thrust_map.k_thrust_m_s2(battery_voltage_v)
 
+    def trim_thrust(self, trim: float) -> float:  # noqa: ARG002 - the protocol's signature
+        """None: the integral is the trim, and the gains stay what the file says."""
+        return 0.0
+
     def reset(self, time_s: float, setpoint: Setpoint | None) -> None:  # noqa: ARG002 - the protocol's signature
         """Take over; the first step chooses the integral so that it goes on with `setpoint`."""
         self._pid.reset()

@@ -51,7 +51,14 @@ class Controller(Protocol):
         ...
 
     def k_thrust_m_s2(self, battery_voltage_v: float | None) -> float:
-        """Thrust acceleration at full command that the controller reckons with [m/s^2]; the observer needs the same."""
+        """Thrust acceleration at full command that the controller reckons with [m/s^2]."""
+        ...
+
+    def trim_thrust(self, trim: float) -> float:
+        """The thrust is (1 + trim) times what airframe file and voltage say; returns the trim that is reckoned with.
+
+        One whose integral finds the thrust anyway may return 0.
+        """
         ...
 
     @property

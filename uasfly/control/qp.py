@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uasfly.messages import Array
+from uasfly.model import INPUTS, STATES
 
 Active = NDArray[np.int8]  # (N, 3): -1 at the lower bound, 0 free, 1 at the upper bound
 
@@ -52,6 +53,15 @@ class StageQp:
     def nodes(self) -> int:
         """Number of stages N."""
         return int(self.defect.shape[0])
+
+    @classmethod
+    def zeros(cls, nodes: int, packed_size: int) -> StageQp:
+        """Arrays for a program, to be filled."""
+        of_states, of_inputs = (nodes + 1, STATES), (nodes, INPUTS)
+        return cls(
+            *(np.zeros((nodes, packed_size)), np.zeros((nodes, STATES)), np.zeros(STATES)),
+            *(np.zeros(shape) for shape in (of_states, of_inputs, of_states, of_inputs, of_inputs, of_inputs)),
+        )
 
 
 @dataclass(frozen=True, slots=True)

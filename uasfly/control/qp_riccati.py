@@ -14,18 +14,25 @@ import numpy as np
 
 from uasfly.control.interior_point import InteriorPoint
 from uasfly.control.qp import Active, QpOptions, QpSolution, SolveStatus, StageQp
-from uasfly.control.riccati import StageFunctions
+from uasfly.control.riccati_machine import MachineFunctions
 from uasfly.control.sweeps import RiccatiSweeps
 
 MANY = 0.25  # changes a stage; where more than so many do not become fewer, the guess is no good
 
 
 class RiccatiQp:
-    """QpSolver for N stages; one instance is for one thread."""
+    """QpSolver for N stages; one instance is for one thread.
 
-    def __init__(self, stages: StageFunctions, packed_size: int, nodes: int, options: QpOptions | None = None) -> None:
+    Attributes:
+        program: arrays that may be filled and handed to `solve` instead of others, which are copied.
+    """
+
+    def __init__(
+        self, functions: MachineFunctions, packed_size: int, nodes: int, options: QpOptions | None = None
+    ) -> None:
         self._options = options or QpOptions()
-        self._sweeps = RiccatiSweeps(stages, packed_size, nodes)
+        self._sweeps = RiccatiSweeps(functions, packed_size, nodes)
+        self.program = self._sweeps.program
 
     def solve(self, qp: StageQp, active: Active) -> QpSolution:
         """Solve from a guess of the active bounds."""
@@ -51,7 +58,8 @@ class RiccatiQp:
                 # No set stands (a bound is active with no multiplier, say): the point inside is the result.
                 active, work.inputs[:] = interior.active(), interior.point
                 work.rollout()
-        if not math.isfinite(np.vdot(work.states, work.states) + np.vdot(work.inputs, work.inputs)):
+        # What is not finite stays so down to the last state.
+        if not math.isfinite(sum(work.states[-1].tolist())):
             status = SolveStatus.FAILED
         return QpSolution(status, work.states.copy(), work.inputs.copy(), active, sweeps, iterations)
 
@@ -62,20 +70,25 @@ class RiccatiQp:
         least, greatest = qp.lower - tolerance, qp.upper + tolerance
         last, before, changes = -1, active.size + 1, 1
         for sweep in range(1, most + 1):
-            held = np.logical_or.reduce(active, axis=1).tolist()
-            any_held = True in held
+            any_held = np.count_nonzero(active) > 0
             if any_held:
                 at_bound = active != 0
                 work.free[:] = ~at_bound
                 work.fixed[:] = np.where(active < 0, qp.lower, qp.upper) * at_bound
-            work.active_set(held, last)
-            following = (inputs > greatest).view(np.int8) - (inputs < least).view(np.int8)  # 0 for what is held
+                work.active_set(np.logical_or.reduce(at_bound, axis=1).tolist(), last)
+            else:
+                work.unconstrained(last)
+            above, below = inputs > greatest, inputs < least  # neither for what is held
+            if not (any_held or np.count_nonzero(above | below)):
+                return active, 0, sweep
+            following = above.view(np.int8) - below.view(np.int8)
             if any_held:
                 following += np.where(active * gradient > tolerance, 0, active)
-            changed = np.flatnonzero(following != active)
-            active, changes = following, changed.size
+            changed = following != active
+            active, changes = following, int(np.count_nonzero(changed))
             if not changes or (changes >= before and changes > MANY * qp.nodes):
                 return active, changes, sweep
             before = changes
-            last = int(changed[-1]) // active.shape[1]  # behind this stage the cost to go is what it was
+            # Behind this stage the cost to go is what it was.
+            last = int(np.flatnonzero(changed)[-1]) // active.shape[1]
         return active, changes, most

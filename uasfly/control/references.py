@@ -51,3 +51,22 @@ def input_reference_function() -> ca.Function:
     inputs = ca.fmin(ca.fmax(wanted, lower), upper)
     arguments = [start, end, parameters, interval, lower, upper]
     return ca.Function("uasfly_input_reference", arguments, [inputs], {"cse": True})
+
+
+def reference_stage_function() -> ca.Function:
+    """Both of them and the state reference for one interval: a third of the calls for who pays for each.
+
+    The function maps the trim at the interval's end (3,), then acceleration, velocity and position (3,) and yaw at its
+    start, force (3,), parameters (11,), limits (3,), interval, lower and upper bounds (3,) to trim (3,) and state
+    reference (8,) at the start and the input reference (3,).
+    """
+    trim, input_reference = trim_function(), input_reference_function()
+    end, position, interval = ca.SX.sym("end", 3), ca.SX.sym("position", 3), ca.SX.sym("h")
+    acceleration, velocity, yaw, force, parameters, limits = trim.sx_in()
+    lower, upper = ca.SX.sym("lower", INPUTS), ca.SX.sym("upper", INPUTS)
+    start = trim(acceleration, velocity, yaw, force, parameters, limits)
+    inputs = input_reference(start, end, parameters, interval, lower, upper)
+    motion = [acceleration, velocity, position, yaw]
+    arguments = [end, *motion, force, parameters, limits, interval, lower, upper]
+    results = [start, ca.vertcat(position, velocity, start[:2]), inputs]
+    return ca.Function("uasfly_reference_stage", arguments, results, {"cse": True})

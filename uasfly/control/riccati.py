@@ -69,14 +69,17 @@ class _Factor:
     @classmethod
     def of(cls, matrix: ca.SX) -> _Factor:
         pivots: list[ca.SX] = []
+        reciprocals: list[ca.SX] = []
         lower: dict[tuple[int, int], ca.SX] = {}
         for k in range(INPUTS):
             pivot = matrix[k, k] - sum(lower[k, j] ** 2 * pivots[j] for j in range(k))
             pivots.append(pivot)
+            # Pivots are positive. A bare reciprocal CasADi would turn back into a division at each of its ten uses.
+            reciprocals.append(ca.fabs(1.0 / pivot))
             for i in range(k + 1, INPUTS):
                 rest = matrix[i, k] - sum(lower[i, j] * lower[k, j] * pivots[j] for j in range(k))
-                lower[i, k] = rest / pivot
-        return cls([1.0 / pivot for pivot in pivots], lower)
+                lower[i, k] = rest * reciprocals[k]
+        return cls(reciprocals, lower)
 
     @classmethod
     def unpacked(cls, packed: ca.SX) -> _Factor:
@@ -105,13 +108,46 @@ class _Factor:
         return ca.vertcat(*rows)
 
 
+@dataclass(frozen=True, slots=True)
+class _Ahead:
+    """The cost to go behind a stage, by what the stage has in hand: dx and du, with W for [A B] from roll on.
+
+    Attributes:
+        xx, ux, uu: blocks of [A B]' P [A B]. x, u: parts of [A B]' slope. slope: P c + p.
+    """
+
+    xx: ca.SX
+    ux: ca.SX
+    uu: ca.SX
+    x: ca.SX
+    u: ca.SX
+    slope: ca.SX
+
+    @classmethod
+    def of_defect(cls, hessian: ca.SX, slope: ca.SX, jacobian: ca.SX, defect: ca.SX) -> _Ahead:
+        last = jacobian[:, ROLL:]
+        joint = ca.horzcat(hessian @ last, hessian @ defect + slope)
+        return cls.of(hessian, jacobian, joint, joint.T @ last)
+
+    @classmethod
+    def of(cls, hessian: ca.SX, jacobian: ca.SX, joint: ca.SX, products: ca.SX) -> _Ahead:
+        """From Y = [P W, P c + p] and Y' W."""
+        first, tilt, slope = jacobian[:, :ROLL], STATES - ROLL, joint[:, -1]
+        mixed, square, of_last = first.T @ joint[:, :-1], products[:-1, :], products[-1, :].T
+        corner = mixed[:, :tilt]
+        xx = ca.blockcat([[first.T @ (hessian @ first), corner], [corner.T, square[:tilt, :tilt]]])
+        ux, uu = ca.horzcat(mixed[:, tilt:].T, square[:tilt, tilt:].T), square[tilt:, tilt:]
+        return cls(xx, ux, uu, ca.vertcat(first.T @ slope, of_last[:tilt]), of_last[tilt:], slope)
+
+
 def stage_functions(pattern: JacobianPattern, *, products_given: bool = False) -> StageFunctions:
     """The stage functions for a Jacobian pattern.
 
     Args:
         pattern: of [A B].
-        products_given: whether `backward` and `barrier_backward` take two products of P before all other arguments, for
-            callers that have them cheaper: with the last columns of [A B] from roll on (8 rows), and with c + B fixed.
+        products_given: whether `backward` and `barrier_backward` take two products before all other arguments, for
+            callers that have them cheaper: Y = [P W, P (c + B fixed) + p] (8, 6) with the columns W of [A B] from roll
+            on, and Y' W (6, 5), both as vectors by columns.
     """
     symbol = ca.SX.sym
     cost, slope, packed, defect = (
@@ -127,15 +163,16 @@ def stage_functions(pattern: JacobianPattern, *, products_given: bool = False) -
     jacobian = pattern.symbolic(packed)
     a, b = jacobian[:, :STATES], jacobian[:, STATES:]
 
-    hessian = _symmetric(cost, STATES)
-    carried, cost_of_defect = hessian @ jacobian[:, ROLL:], hessian @ defect
-    cost_of_held = hessian @ (defect + b @ fixed)
+    hessian, last = _symmetric(cost, STATES), jacobian[:, ROLL:]
     given: list[ca.SX] = []
     if products_given:
-        carried, cost_of_defect = symbol("PJ", *carried.shape), symbol("Pd", STATES)
-        given, cost_of_held = [carried, cost_of_defect], cost_of_defect
-    carried_x, carried_u = ca.horzcat(hessian @ a[:, :ROLL], carried[:, : STATES - ROLL]), carried[:, STATES - ROLL :]
-    h_xx, h_ux, h_uu = ca.diag(weight_x) + a.T @ carried_x, carried_u.T @ a, ca.diag(weight_u) + b.T @ carried_u
+        width = last.shape[1]
+        given = [symbol("Y", STATES * (width + 1)), symbol("YW", (width + 1) * width)]
+        joint, products = ca.reshape(given[0], STATES, width + 1), ca.reshape(given[1], width + 1, width)
+        plain = with_held = _Ahead.of(hessian, jacobian, joint, products)
+    else:
+        plain, with_held = (_Ahead.of_defect(hessian, slope, jacobian, c) for c in (defect, defect + b @ fixed))
+    h_xx, h_ux, h_uu = ca.diag(weight_x) + plain.xx, plain.ux, ca.diag(weight_u) + plain.uu
 
     def eliminate(uu: ca.SX, ux: ca.SX, u: ca.SX, x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, _Factor]:
         factor = _Factor.of(uu)
@@ -152,16 +189,14 @@ def stage_functions(pattern: JacobianPattern, *, products_given: bool = False) -
     for i in range(INPUTS):
         for k in range(INPUTS):
             masked[i, k] = free[i] * free[k] * h_uu[i, k] if i != k else free[i] * h_uu[i, i] + (1.0 - free[i])
-    ahead = cost_of_held + slope
-    h_u = r + weight_u * fixed + b.T @ ahead
-    p_next, s_next, big_k, small_k, _ = eliminate(masked, ca.diag(free) @ h_ux, free * h_u, q + a.T @ ahead)
+    h_u = r + weight_u * fixed + with_held.u
+    p_next, s_next, big_k, small_k, _ = eliminate(masked, ca.diag(free) @ h_ux, free * h_u, q + with_held.x)
     arguments = [*given, cost, slope, packed, defect, q, r, weight_x, weight_u]
     results = [p_next, s_next, big_k, small_k, ca.vec(h_ux), upper_triangle(h_uu), h_u]
     backward = _function("uasfly_backward", [*arguments, free, fixed], results)
 
-    ahead = cost_of_defect + slope
-    p_next, s_next, big_k, small_k, factor = eliminate(h_uu, h_ux, r + b.T @ ahead, q + a.T @ ahead)
-    results = [p_next, s_next, big_k, small_k, factor.packed(), cost_of_defect]
+    p_next, s_next, big_k, small_k, factor = eliminate(h_uu, h_ux, r + plain.u, q + plain.x)
+    results = [p_next, s_next, big_k, small_k, factor.packed(), plain.slope - slope]
     barrier_backward = _function("uasfly_barrier_backward", arguments, results)
 
     stored, stored_cost = symbol("factor", FACTOR), symbol("Pc", STATES)

@@ -18,7 +18,7 @@ class Stagewise:
     Args:
         function: of dense arguments and results.
         arguments: (N, n) each, one row a stage; or (n,), the same for all stages.
-        results: (N, n) each.
+        results: (N, n) each; or (n,), where a stage leaves what it needs no longer than until the next one.
 
     Attributes:
         calls: evaluate one stage each, in the order of the stages; only while this object lives: they hold no
@@ -38,7 +38,7 @@ class Stagewise:
         sparsities += [function.sparsity_out(i) for i in range(function.n_out())]
         for array, sparsity in zip((*arguments, *results), sparsities, strict=True):
             _check(function.name(), array, sparsity)
-        stages = results[0].shape[0]
+        stages = next(array.shape[0] for array in (*arguments, *results) if array.ndim == 2)
         if any(array.shape[0] != stages for array in (*arguments, *results) if array.ndim == 2):
             raise ValueError(f"{function.name()} needs arrays of the same number of rows")
         self._kept: list[object] = [arguments, results]
@@ -46,9 +46,9 @@ class Stagewise:
         for k in range(stages):
             buffer, call = function.buffer()
             for i, array in enumerate(arguments):
-                buffer.set_arg(i, memoryview(array if array.ndim == 1 else array[k]))  # type: ignore[call-arg, arg-type]
+                buffer.set_arg(i, _row(array, k))  # type: ignore[call-arg]
             for i, array in enumerate(results):
-                buffer.set_res(i, memoryview(array[k]))  # type: ignore[call-arg]
+                buffer.set_res(i, _row(array, k))  # type: ignore[call-arg]
             self._kept.append(buffer)
             self.calls.append(call)
 
@@ -61,6 +61,11 @@ class Stagewise:
         """Evaluate from stage `last` down to the first."""
         for call in self.calls[last::-1]:
             call()
+
+
+def _row(array: Array, k: int) -> memoryview:
+    row: Array = array if array.ndim == 1 else array[k]
+    return memoryview(row)  # type: ignore[arg-type]
 
 
 def _check(name: str, array: Array, sparsity: ca.Sparsity) -> None:

@@ -11,15 +11,19 @@ SMALLEST_SCALE, LARGEST_SCALE = 0.6, 1.3  # beyond these the voltage, or the ref
 
 
 class ThrustMap:
-    """k_thrust [m/s^2 at full command] = k_thrust of the file * (voltage / reference voltage) ** exponent.
+    """k_thrust [m/s^2 at full command] = k_thrust of the file * (voltage / reference voltage) ** exponent * (1 + trim).
 
     The voltage is low-passed over a second and the scale bounded; a voltage that is missing, zero or not finite leaves
     everything as it was.
+
+    Attributes:
+        trim: what file and voltage do not know of, see `thrust_trim`.
     """
 
     def __init__(self, airframe: Airframe) -> None:
         self._nominal = airframe.model.k_thrust_m_s2
         self._battery = airframe.battery
+        self.trim = 0.0
         self._voltage_v: float | None = None
         self._time_s: float | None = None
 
@@ -38,6 +42,6 @@ class ThrustMap:
         """k_thrust [m/s^2] at the filtered voltage; before the first `update`, at `voltage_v`, or the file's."""
         voltage = self._voltage_v if self._voltage_v is not None else voltage_v
         if voltage is None or not (math.isfinite(voltage) and voltage > 0.0):
-            return self._nominal
+            return self._nominal * (1.0 + self.trim)
         scale: float = (voltage / self._battery.reference_voltage_v) ** self._battery.thrust_exponent
-        return self._nominal * min(max(scale, SMALLEST_SCALE), LARGEST_SCALE)
+        return self._nominal * min(max(scale, SMALLEST_SCALE), LARGEST_SCALE) * (1.0 + self.trim)

@@ -29,11 +29,12 @@ class Workspace:
     def __init__(self, problem: Problem) -> None:
         nodes = problem.grid.nodes
         points = (nodes + 1, 3)
-        # What is handed in and what is computed from it lie in a block each, which is checked in one go.
-        self._given, views = _block((PARAMETERS,), (nodes, 3), (nodes + 1,), (STATES,), points, points, points)
-        self.parameters, self.force, self.yaw, self.initial, self.position, self.velocity, self.acceleration = views
-        self._references, views = _block((nodes + 1, STATES), (nodes, INPUTS))
-        self.state_reference, self.input_reference = views
+        # What is handed in and what is computed from it lie in one block, which is checked in one go.
+        given = [(PARAMETERS,), (nodes, 3), (nodes + 1,), (STATES,), points, points, points]
+        self._data, views = _block(*given, (nodes + 1, STATES), (nodes, INPUTS))
+        self.parameters, self.force, self.yaw, self.initial, self.position, self.velocity, self.acceleration = views[:7]
+        self.state_reference, self.input_reference = views[7:]
+        self._given = self._data[: sum(view.size for view in views[:7])]
         tilt = float(np.min(np.abs((problem.input_lower[1:], problem.input_upper[1:]))))
         self.limits: Array = np.array((tilt, problem.input_lower[0], problem.input_upper[0]))
         self.states: Array = np.zeros((nodes + 1, STATES))
@@ -45,9 +46,9 @@ class Workspace:
         """Whether all data of a solve are."""
         return math.isfinite(np.add.reduce(self._given))
 
-    def references_are_finite(self) -> bool:
-        """Whether the references for states and inputs are."""
-        return math.isfinite(np.add.reduce(self._references))
+    def is_finite(self) -> bool:
+        """Whether they and the references for states and inputs are."""
+        return math.isfinite(np.add.reduce(self._data))
 
 
 def _block(*shapes: tuple[int, ...]) -> tuple[Array, list[Array]]:

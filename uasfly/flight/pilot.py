@@ -21,6 +21,7 @@ from uasfly.flight.monitors import Monitors, Watched
 from uasfly.flight.preflight import Preflight, announcements, as_pilot_flies, stop_reason
 from uasfly.flight.response import Response
 from uasfly.flight.sequencer import Sequencer
+from uasfly.flight.trimmed_thrust import TrimmedThrust
 from uasfly.flight.view import VehicleView
 from uasfly.message_class import message
 from uasfly.messages import (
@@ -111,6 +112,8 @@ class Pilot:
         self._wind_meter = None if wind is None else WindMeter(wind, airframe.limits)
         self._wind: WindEstimate | None = None
         self._response = Response()
+        self._thrust = TrimmedThrust(observer, controller)
+        self._estimate: StateEstimate | None = None  # of the last step
         self._phase = self.sequencer.phase  # as far as this object has followed it
         self._ground: Array | None = None  # where the vehicle last stood
         self._met: Array | None = None  # where it was first known
@@ -154,9 +157,12 @@ class Pilot:
             self.observer.add(sample)
             if meter is not None and isinstance(sample, OdometrySample):
                 meter.add(sample)
-        k_thrust = self.controller.k_thrust_m_s2(self.view.voltage_v)
+        text = self._thrust.step(time_s, self._estimate, self.view.in_air)
+        if text:
+            self.announce(4, text)
+        k_thrust = self._thrust.k_thrust_m_s2(self.view.voltage_v)
         self.observer.set_k_thrust(k_thrust)
-        estimate = self.observer.estimate(time_s)
+        estimate = self._estimate = self.observer.estimate(time_s)
         if estimate is not None:
             self._note_places(estimate)
 
@@ -379,4 +385,5 @@ class Pilot:
             marker_age_s=math.nan if self._guide is None else self._guide.age_s,
             waits_for="the marker" if in_legs and self._guide is not None and not course.begun else "",
             wind=self._wind,
+            thrust_trim=self._thrust.trim,
         )

@@ -49,6 +49,7 @@ class SummaryCollector:
     _fallbacks: dict[str, int] = field(default_factory=dict)
     _warnings: list[str] = field(default_factory=list)
     _preflight: list[dict[str, str]] = field(default_factory=list)
+    _thrust_trim: float = 0.0
     _phase: Phase = Phase.CONNECT
     _reason: str = ""
 
@@ -71,6 +72,7 @@ class SummaryCollector:
             self._errors.cycle(status.time_s, estimate.position_in_world, reference, datum)
             self._force_sum += estimate.force_in_world
             self._force_count += 1
+            self._thrust_trim = status.thrust_trim
         for sample in samples:
             if isinstance(sample, _COMPARED):
                 self._errors.hear(sample)
@@ -138,6 +140,7 @@ class SummaryCollector:
             "rejected": dict(rejected),
             "sightings": self._sightings(),
             "force_m_s2": [round(value, 4) for value in force.tolist()],
+            "thrust_trim": round(self._thrust_trim, 4),
             "wind": self._wind.result(),
             "real_time_factor": round(self.duration_s / wall_s, 3) if wall_s > 0.0 else None,
             "warnings": list(self._warnings),

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from uasfly.airframe import Airframe
+from uasfly.frames import rotation_matrix
 from uasfly.marker_prediction import MarkerPrediction
 from uasfly.messages import (
     Array,
@@ -46,6 +47,7 @@ EXPECTED_WITHIN_S = 0.5  # of where the filter stands: beyond it nothing is said
 GLIDE_AFTER_S, GLIDE_FOR_S = 1.0, 5.0  # without a sighting for so long, what the next ones correct is told gradually
 MOVED_AFTER, MOVED_M = 5, 0.15  # so many sightings refused in a row, that far away: the marker has been moved
 THRUST_SHOWS_S = 0.05  # in the velocity, over so long: for what carries the vehicle
+FORCE_SHOWS_S = 0.5  # the force is what thrust left over in about so long
 RESTART_AFTER_S = 1.0  # samples that are all too old for this long: the clock was set back, start again
 
 
@@ -146,6 +148,20 @@ class Observer:
             self._k_thrust_m_s2 = k_thrust_m_s2
         else:
             self.counters.non_finite += 1
+
+    def correct_thrust(self, ratio: float) -> None:
+        """The commands so far gave `ratio` times the thrust that was reckoned with; the force makes up for it.
+
+        Thrust and force together, and with them motion and attitude, stay what they were: nothing is learnt again.
+        Commands to come go by `set_k_thrust`, as ever.
+        """
+        timeline = self._timeline
+        if timeline is not None:
+            now_s = timeline.newest.time_s
+            more = (ratio - 1.0) * self._thrust.mean(now_s - FORCE_SHOWS_S, now_s)
+            up_in_world = rotation_matrix(timeline.newest.packed[s.QUATERNION])[:, 2]
+            timeline.shift_force(-more * up_in_world)
+        self._thrust.rescale(ratio)
 
     def estimate(self, time_s: float) -> StateEstimate | None:
         """State at `time_s`; the sigmas are those of the newest measurement, or of `time_s` after SILENT_AFTER_S.

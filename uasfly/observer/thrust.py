@@ -19,12 +19,13 @@ class ThrustHistory:
     def __init__(self, delay_s: float, default_m_s2: float) -> None:
         self._delay_s = delay_s
         self._default = default_m_s2
+        self._scale = 1.0
         self._entries: list[tuple[float, float]] = []  # time at which it begins to act, acceleration
 
     def add(self, time_s: float, acceleration_m_s2: float) -> None:
         """A command of `acceleration_m_s2` left at `time_s`; commands may come in any order."""
         entries = self._entries
-        entry = (time_s + self._delay_s, acceleration_m_s2)
+        entry = (time_s + self._delay_s, acceleration_m_s2 / self._scale)
         if not entries or entry[0] > entries[-1][0]:
             entries.append(entry)
         else:
@@ -32,6 +33,11 @@ class ThrustHistory:
         if len(entries) > _PRUNE_AT:
             keep_from = bisect_right(entries, (entries[-1][0] - _KEPT_S, float("inf"))) - 1
             del entries[: max(keep_from, 0)]
+
+    def rescale(self, ratio: float) -> None:
+        """All commands so far give `ratio` times what they were added with; what is assumed before them does not."""
+        self._scale *= ratio
+        self._default /= ratio
 
     def mean(self, start_s: float, end_s: float) -> float:
         """Mean acceleration [m/s^2] over [start_s, end_s]; where that is empty, what acts just before `end_s`."""
@@ -47,5 +53,5 @@ class ThrustHistory:
             index -= 1
         value = entries[index][1] if index >= 0 else self._default
         if upper == end_s:
-            return value
-        return (total + value * (upper - start_s)) / (end_s - start_s)
+            return value * self._scale
+        return self._scale * (total + value * (upper - start_s)) / (end_s - start_s)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 
+from uasfly.messages import Array
+from uasfly.observer import states as s
 from uasfly.observer.door import Odometry, Sighting
 from uasfly.observer.moment import Moment, Verdict
 from uasfly.observer.step import Stepper
@@ -69,6 +71,14 @@ class Timeline:
             moment, _ = self._stepper.advance(moment, old.time_s, old.measured, old.airborne)
             self._moments.append(moment)
         return verdicts
+
+    def shift_force(self, change: Array) -> None:
+        """Add `change` (3,) [m/s^2, world] to the force at every moment of flight; all else stays."""
+        shifted = None
+        for moment in self._moments:
+            if moment.airborne and moment.packed is not shifted:  # moments of the same time may share it
+                moment.packed[s.FORCE] += change
+            shifted = moment.packed
 
     def forget(self, marker_id: int) -> None:
         """Take a marker out of every moment, and its sightings with it."""

@@ -100,6 +100,9 @@ class _Fed:
     def k_thrust_m_s2(self, battery_voltage_v: float | None) -> float:
         return self._controller.k_thrust_m_s2(battery_voltage_v)
 
+    def trim_thrust(self, trim: float) -> float:
+        return self._controller.trim_thrust(trim)
+
     def reset(self, time_s: float, setpoint: Setpoint | None) -> None:
         self._controller.reset(time_s, setpoint)
 

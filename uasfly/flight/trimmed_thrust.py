@@ -1,0 +1,78 @@
+"""Trims the thrust of observer and controller, and tells when it is far from the airframe file's."""
+
+from __future__ import annotations
+
+import math
+
+from uasfly.control.controller import Controller
+from uasfly.control.thrust_trim import ThrustTrim
+from uasfly.messages import StateEstimate
+from uasfly.observer.observer import Observer
+
+INTERVAL_S = 0.2
+OFF_THE_GROUND_S = 3.0  # until then the ground carries a part, or the force still forgets that it did
+SURE_SIGMA = 0.03  # of the trim, before anything is told
+LESS_TOLD, MORE_TOLD = 0.1, 0.2  # wind across the rotors lifts: in 8 m/s the thrust is 7 % more on a sound vehicle
+TOLD_AGAIN = 0.05
+
+
+class TrimmedThrust:
+    """The thrust trim of one flight.
+
+    Args:
+        observer, controller: who reckon with it.
+
+    Attributes:
+        trim: share by which the thrust is more (negative: less) than the airframe file says for command and voltage.
+    """
+
+    def __init__(self, observer: Observer, controller: Controller) -> None:
+        self._observer, self._controller = observer, controller
+        self._estimator = ThrustTrim()
+        self._due_s = -math.inf
+        self._flies = False
+        self._told = 0.0
+        self.trim = self._taken = 0.0
+
+    def step(self, time_s: float, estimate: StateEstimate | None, in_air: bool) -> str:
+        """Before the observer is asked for `time_s`; frozen on the ground.
+
+        Args:
+            time_s: now.
+            estimate: of the cycle before.
+            in_air: whether the vehicle flies.
+
+        Returns:
+            What is to be told; "" nearly always.
+        """
+        if in_air is not self._flies:
+            self._flies = in_air
+            self._estimator.lift_off()
+            self._due_s = time_s + OFF_THE_GROUND_S
+        if not in_air or estimate is None or time_s < self._due_s:
+            return ""
+        self._due_s = time_s + INTERVAL_S - 1e-6
+        before, up = self.trim, 2
+        trim = self._estimator.update(
+            time_s,
+            float(estimate.force_in_world[up]),
+            float(estimate.force_sigma_m_s2[up]),
+            float(estimate.velocity_in_world[up]),
+        )
+        if trim == before:
+            return ""
+        self.trim, self._taken = trim, self._controller.trim_thrust(trim)
+        self._observer.correct_thrust((1.0 + trim) / (1.0 + before))
+        return self._tell(trim)
+
+    def k_thrust_m_s2(self, battery_voltage_v: float | None) -> float:
+        """Thrust acceleration at full command [m/s^2], whatever of the trim the controller takes."""
+        return self._controller.k_thrust_m_s2(battery_voltage_v) * (1.0 + self.trim) / (1.0 + self._taken)
+
+    def _tell(self, trim: float) -> str:
+        size = abs(trim)
+        if size < max(LESS_TOLD if trim < 0.0 else MORE_TOLD, self._told) or self._estimator.sigma > SURE_SIGMA:
+            return ""
+        self._told = size + TOLD_AGAIN
+        kind = "less" if trim < 0.0 else "more"
+        return f"thrust is {size * 100.0:.0f} % {kind} than the airframe file says; payload, battery, propellers?"
