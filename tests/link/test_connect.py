@@ -89,10 +89,10 @@ async def test_the_wanted_one_of_two_vehicles_is_taken() -> None:
 
 
 async def test_two_vehicles_without_a_system_id_are_refused_and_listed() -> None:
-    """Which of them is flown must not be up to whose heartbeat comes first."""
+    """Which of them is flown must not be up to whose heartbeat comes first. (MAVSDK may not know their kinds yet.)"""
     port = free_udp_port()
     with FakeVehicle(UdpWire(port), system_id=3), FakeVehicle(UdpWire(port), system_id=4):
-        with pytest.raises(LinkError, match=r"expected one vehicle, heard 2: 3 \(PX4\), 4 \(PX4\).*--system-id"):
+        with pytest.raises(LinkError, match=r"expected one vehicle, heard 2: 3 \(\w+\), 4 \(\w+\).*--system-id"):
             await MavsdkLink.connect(f"udpin://127.0.0.1:{port}", listen_s=PATIENCE_S)
         check_available(parse_url(f"udpin://127.0.0.1:{port}"))
 
@@ -106,7 +106,7 @@ async def test_a_second_vehicle_that_is_heard_late_is_refused_too() -> None:
         connecting = asyncio.create_task(MavsdkLink.connect(url, listen_s=4.0))
         await asyncio.sleep(1.5)
         late.silent = False
-        with pytest.raises(LinkError, match=r"1 \(PX4\), 9 \(PX4\)"):
+        with pytest.raises(LinkError, match=r"1 \(\w+\), 9 \(\w+\)"):
             await connecting
         check_available(parse_url(url))
 
