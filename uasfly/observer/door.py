@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from operator import mul
 
 import numpy as np
 
+from uasfly.message_class import message
 from uasfly.messages import Array, MarkerSample, OdometrySample
 
 _LARGEST_SQUARED = 1e14  # of m: beyond it a number is as good as infinite
@@ -19,7 +19,7 @@ _NORM_TOLERANCE = 0.05  # a quaternion further from unit length is no rotation
 _ALL = (1.0, 1.0, 1.0)
 
 
-@dataclass(frozen=True, slots=True)
+@message
 class Odometry:
     """What can be used of an OdometrySample.
 
@@ -81,7 +81,7 @@ def unit_quaternion(values: list[float]) -> list[float] | None:
     return [w / norm, x / norm, y / norm, z / norm]
 
 
-@dataclass(frozen=True, slots=True)
+@message
 class Sighting:
     """A usable MarkerSample.
 

@@ -12,7 +12,8 @@ The configured density is the least. A calmer filter would be right in light win
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+
+from uasfly.message_class import message
 
 LAG_S = 0.5  # about the filter's own memory: a shorter one shows noise, a longer one only the slow part of gusts
 MEMORY_S = 5.0  # of the mean square: some gusts, so that no single event (contact, a fault of GNSS) stays for long
@@ -22,12 +23,13 @@ MOST = 3.0  # densities stay below this multiple of the configured one: setpoint
 # ground. They are gone before thrust has answered them; a force that followed them all would make thrust chase its own
 # lag. So the variance of the unmodelled vertical acceleration goes with this power of the force's: its gain falls.
 VERTICAL_POWER = 1.5
+SPACING_S = 0.045  # of the estimates that are looked at: more say nothing more of increments over the lag
 LONGEST_ELAPSED_S = 0.2  # without an estimate: what was before is not compared
 
 Vector = tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
+@message
 class Gusts:
     """The gusts as measured up to some time.
 
@@ -48,7 +50,9 @@ class Gusts:
             density: [m/s^2/sqrt(s)] configured for the force.
         """
         past = self.past
-        elapsed_s = time_s - past[-1][0] if past else 0.0
+        elapsed_s = time_s - past[-1][0] if past else SPACING_S
+        if elapsed_s < SPACING_S:
+            return self
         if elapsed_s > LONGEST_ELAPSED_S:
             past = ()
         first = 0

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from uasfly.message_class import message
 from uasfly.messages import Array
 from uasfly.observer import states as s
 from uasfly.observer.door import Odometry, Sighting
 from uasfly.observer.gusts import Gusts
 
 
-@dataclass(frozen=True, slots=True)
+@message
 class Moment:
     """The filter at one time, after the measurement of that time.
 

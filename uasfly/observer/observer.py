@@ -27,7 +27,7 @@ from uasfly.messages import (
 )
 from uasfly.observer import states as s
 from uasfly.observer.agreement import Agreement
-from uasfly.observer.contact import GroundContact
+from uasfly.observer.contact import LIGHT_M_S2, GroundContact
 from uasfly.observer.diagnosis import Diagnosis, Journal
 from uasfly.observer.door import Odometry, Sighting, checked_odometry, checked_sighting
 from uasfly.observer.expected import expected_marker
@@ -276,7 +276,9 @@ class Observer:
 
     def _look_for_contact(self, odometry: Odometry) -> None:
         if self._in_air and odometry.use[s.VELOCITY_SENSOR]:
-            thrust_m_s2 = self._thrust.mean(odometry.time_s - THRUST_SHOWS_S, odometry.time_s)
+            thrust_m_s2 = self._thrust.newest_m_s2
+            if thrust_m_s2 <= LIGHT_M_S2:
+                thrust_m_s2 = self._thrust.mean(odometry.time_s - THRUST_SHOWS_S, odometry.time_s)
             self._contact.look(odometry.time_s, odometry.velocity[2], thrust_m_s2)
 
     def _command(self, time_s: float, thrust: float) -> bool:

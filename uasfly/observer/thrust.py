@@ -39,6 +39,11 @@ class ThrustHistory:
         self._scale *= ratio
         self._default /= ratio
 
+    @property
+    def newest_m_s2(self) -> float:
+        """What the newest command gives, once it acts."""
+        return (self._entries[-1][1] if self._entries else self._default) * self._scale
+
     def mean(self, start_s: float, end_s: float) -> float:
         """Mean acceleration [m/s^2] over [start_s, end_s]; where that is empty, what acts just before `end_s`."""
         entries = self._entries
