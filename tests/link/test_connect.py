@@ -10,12 +10,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from mavsdk import System
 
 from tests.link.fake_vehicle import ARDUPILOT, GROUND_STATION, FakeVehicle
 from tests.link.waiting import PATIENCE_S, arrived, texts, until
 from tests.link.wires import SerialWire, TcpClientWire, TcpWire, UdpWire, free_udp_port
 from uasfly.errors import LinkError
-from uasfly.link import upkeep
+from uasfly.link import bridge, upkeep
 from uasfly.link.bridge import HeardSystem
 from uasfly.link.finding import refuse_several
 from uasfly.link.mavsdk_link import MavsdkLink
@@ -89,12 +90,30 @@ async def test_the_wanted_one_of_two_vehicles_is_taken() -> None:
 
 
 async def test_two_vehicles_without_a_system_id_are_refused_and_listed() -> None:
-    """Which of them is flown must not be up to whose heartbeat comes first. (MAVSDK may not know their kinds yet.)"""
+    """Which of them is flown must not be up to whose heartbeat comes first."""
     port = free_udp_port()
     with FakeVehicle(UdpWire(port), system_id=3), FakeVehicle(UdpWire(port), system_id=4):
-        with pytest.raises(LinkError, match=r"expected one vehicle, heard 2: 3 \(\w+\), 4 \(\w+\).*--system-id"):
+        with pytest.raises(LinkError, match=r"expected one vehicle, heard 2: 3 \(PX4\), 4 \(PX4\).*--system-id"):
             await MavsdkLink.connect(f"udpin://127.0.0.1:{port}", listen_s=PATIENCE_S)
         check_available(parse_url(f"udpin://127.0.0.1:{port}"))
+
+
+async def test_an_autopilot_that_mavsdk_does_not_know_yet_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At first it calls every one generic; the refusal names what they are."""
+    describe = bridge._describe
+    asked: list[int] = []
+
+    def slow(system: System) -> HeardSystem:
+        found = describe(system)
+        asked.append(found.system_id)
+        generic = found.system_id == 4 and asked.count(4) < 4
+        return HeardSystem(4, "GENERIC") if generic else found
+
+    monkeypatch.setattr(bridge, "_describe", slow)
+    port = free_udp_port()
+    one, two = FakeVehicle(UdpWire(port), system_id=3), FakeVehicle(UdpWire(port), system_id=4)
+    with one, two, pytest.raises(LinkError, match=r"heard 2: 3 \(PX4\), 4 \(PX4\)"):
+        await MavsdkLink.connect(f"udpin://127.0.0.1:{port}", listen_s=PATIENCE_S)
 
 
 async def test_a_second_vehicle_that_is_heard_late_is_refused_too() -> None:
@@ -106,7 +125,7 @@ async def test_a_second_vehicle_that_is_heard_late_is_refused_too() -> None:
         connecting = asyncio.create_task(MavsdkLink.connect(url, listen_s=4.0))
         await asyncio.sleep(1.5)
         late.silent = False
-        with pytest.raises(LinkError, match=r"1 \(\w+\), 9 \(\w+\)"):
+        with pytest.raises(LinkError, match=r"1 \(PX4\), 9 \(PX4\)"):
             await connecting
         check_available(parse_url(url))
 

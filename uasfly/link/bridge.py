@@ -25,9 +25,11 @@ from uasfly.link.events import EventFeed
 from uasfly.link.slots import Slot
 
 SEARCH_INTERVAL_S = 0.05
+KINDS_PATIENCE_S = 1.0
 DESTROY_PATIENCE_S = 0.25
 PX4 = Autopilot.PX4.name
 ARDUPILOT = Autopilot.ARDUPILOT.name
+GENERIC = Autopilot.GENERIC.name
 
 _log = logging.getLogger("uasfly.link.mavsdk")
 
@@ -88,9 +90,19 @@ class Bridge:
             for system, description in zip(systems, heard, strict=True):
                 if description.autopilot == PX4 and system_id in {None, description.system_id}:
                     self._attach(system)
-                    return [description, *(other for other in heard if other is not description)]
+                    heard = await self._kinds_known()
+                    return [description, *(other for other in heard if other.system_id != description.system_id)]
             foreign = any(other.autopilot == ARDUPILOT and system_id in {None, other.system_id} for other in heard)
             if foreign or time.monotonic() >= deadline:  # other types may still turn out to be PX4
+                return heard
+            await asyncio.sleep(SEARCH_INTERVAL_S)
+
+    async def _kinds_known(self) -> list[HeardSystem]:
+        """The systems heard, as soon as MAVSDK knows what they are: at first it calls every autopilot generic."""
+        deadline = time.monotonic() + KINDS_PATIENCE_S
+        while True:
+            heard = self.heard()
+            if time.monotonic() >= deadline or all(system.autopilot != GENERIC for system in heard):
                 return heard
             await asyncio.sleep(SEARCH_INTERVAL_S)
 

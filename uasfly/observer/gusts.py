@@ -23,7 +23,7 @@ MOST = 3.0  # densities stay below this multiple of the configured one: setpoint
 # ground. They are gone before thrust has answered them; a force that followed them all would make thrust chase its own
 # lag. So the variance of the unmodelled vertical acceleration goes with this power of the force's: its gain falls.
 VERTICAL_POWER = 1.5
-SPACING_S = 0.045  # of the estimates that are looked at: more say nothing more of increments over the lag
+SPACING_S = 0.035  # of the estimates that are looked at: more say nothing more of increments over the lag
 LONGEST_ELAPSED_S = 0.2  # without an estimate: what was before is not compared
 
 Vector = tuple[float, float, float]
