@@ -101,13 +101,13 @@ async def test_two_vehicles_without_a_system_id_are_refused_and_listed() -> None
 async def test_an_autopilot_that_mavsdk_does_not_know_yet_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     """At first it calls every one generic; the refusal names what they are."""
     describe = bridge._describe
-    asked: list[int] = []
+    looks = 0  # since it has known the first one
 
     def slow(system: System) -> HeardSystem:
+        nonlocal looks
         found = describe(system)
-        asked.append(found.system_id)
-        generic = found.system_id == 4 and asked.count(4) < 4
-        return HeardSystem(4, "GENERIC") if generic else found
+        looks += found == HeardSystem(3, "PX4")
+        return HeardSystem(4, "GENERIC") if found.system_id == 4 and looks < 4 else found
 
     monkeypatch.setattr(bridge, "_describe", slow)
     port = free_udp_port()
