@@ -18,6 +18,7 @@ from uasfly.observer import states as s
 RUNS = 30
 DT_S = 0.01
 MARKER = np.array((2.0, 0.5, 1.5, *(np.array((0.9, 0.1, -0.3, 0.2)) / np.linalg.norm((0.9, 0.1, -0.3, 0.2)))))
+WANDERS = {"velocity_wander_m_s": 0.02, "attitude_wander_rad": 0.003}
 SIGHTING_COVARIANCE = np.diag((0.01**2,) * 3 + (0.02**2,) * 3)
 
 
@@ -72,7 +73,7 @@ def share_inside(averages: Array, dof: int) -> float:
 @pytest.mark.parametrize("window_s", [1e9, 2.0])
 def test_without_a_marker_the_error_is_as_large_as_the_filter_says(window_s: float) -> None:
     """NEES and NIS inside their 95 % bounds with GNSS bias drifting by 0.1 m/sqrt(s) and held; matching off and on."""
-    result = campaign(f550(matching_window_s=window_s, gnss_bias_density=0.1, attitude_wander_rad=0.003), 3.0, seed=2)
+    result = campaign(f550(matching_window_s=window_s, gnss_bias_density=0.1, **WANDERS), 3.0, seed=2)
     assert result.dof == 21
     assert share_inside(result.whole, 21) > 0.9
     for block in range(7):
@@ -84,7 +85,7 @@ def test_without_a_marker_the_error_is_as_large_as_the_filter_says(window_s: flo
 
 def test_with_a_marker_the_error_is_as_large_as_the_filter_says() -> None:
     """NEES of all 27 numbers inside its 95 % bounds while the bias is free, and held after the marker is lost."""
-    airframe = f550(matching_window_s=1e9, gnss_bias_density=0.3, attitude_wander_rad=0.003)
+    airframe = f550(matching_window_s=1e9, gnss_bias_density=0.3, **WANDERS)
     result = campaign(airframe, 4.0, seed=1, sighted_s=(0.5, 2.0))
     assert result.dof == 27
     assert share_inside(result.whole, 27) > 0.9

@@ -153,7 +153,7 @@ def test_transition_is_the_product_of_matrix_exponentials_in_a_turn() -> None:
 
 def noise_error(dt_s: float) -> float:
     """Largest difference to Van Loan's covariance, in units of each pair of sigmas, in a turn of some rad/s."""
-    rng = np.random.default_rng(5)
+    rng = np.random.default_rng(1)
     core, inputs = random_core(rng), flying_inputs(rng, dt_s)
     exact = van_loan(evaluated(es.error_dynamics, core, inputs)[0], densities(inputs), dt_s)
     sigmas = np.sqrt(np.diag(exact))
@@ -168,8 +168,8 @@ def test_noise_covariance_is_van_loans() -> None:
 
 
 def test_noise_covariance_converges_with_the_order_of_its_series() -> None:
-    """Five terms of dt: halving the step takes the error down as dt^3, the position's is the largest."""
-    assert noise_error(0.02) < noise_error(0.04) / 7.9
+    """Five terms of dt: halving the step takes the error of the position's dt^3 down by at least 2^3."""
+    assert noise_error(0.02) < noise_error(0.04) / 8.0
 
 
 def test_noise_covariance_adds_up_over_the_steps() -> None:

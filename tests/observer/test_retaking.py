@@ -18,7 +18,7 @@ LATE = 12  # samples that a sighting is late
 
 def fly(until_s: float, hidden_s: tuple[float, float], walk_m_s: Array, moved_s: float = 1e9) -> tuple[Array, Observer]:
     """Errors (n, 3) [m] of what is told, every 0.01 s; GNSS walks away while the marker is hidden, or it is moved."""
-    rng = np.random.default_rng(5)
+    rng = np.random.default_rng(1)
     airframe = f550(gnss_bias_density=0.1, attitude_wander_rad=0.0)
     truth = flights(airframe, 1, rng)
     observer = Observer(airframe)
@@ -62,7 +62,7 @@ def test_a_bundle_that_is_moved_is_not_followed() -> None:
     """It is told within a second, and the estimate stays where it is: the marker is taken anew where it is now."""
     errors, observer = fly(14.0, (1e9, 1e9), np.zeros(3), moved_s=8.0)
     ((number, away_m),) = observer.take_moved()
-    assert away_m == pytest.approx(0.5, abs=0.1)  # from 60 m away
+    assert away_m == pytest.approx(0.5, abs=0.05)
     moment = observer.moment
     assert moment is not None
     assert moment.markers == (number,)

@@ -110,7 +110,7 @@ def test_with_errors_of_the_configured_correlation_the_filter_knows_how_wrong_it
 
 def fly_by_marker(sighted_s: tuple[float, float], drift_m_s: float) -> tuple[Array, Array, Array]:
     """Fly with GNSS drifting east from 1 s on, marker seen in a span; errors, biases and drifts, one row a sample."""
-    flight, observer = recording(), flying_observer(gnss_bias_density=0.05)
+    flight, observer = recording(), flying_observer(gnss_bias_density=0.03)
     sightings = iter([x for x in flight.sightings if sighted_s[0] < x.time_s < sighted_s[1]])
     seen = next(sightings, None)
     errors, biases, drifts = [], [], []
@@ -155,10 +155,10 @@ def test_nothing_steps_when_the_bias_is_freed_or_held_again() -> None:
     errors, _, _ = fly_by_marker((3.0, 5.0), drift_m_s=0.1)
     steps = np.abs(np.diff(errors, axis=0))
     ordinary = steps[100:290].max()  # what the noise of GNSS does while the bias is held
-    assert steps[290:].max() < 1.5 * ordinary < 0.025
+    assert steps[290:].max() < 1.5 * ordinary < 0.02
     before, at_marker, after = errors[295, 0], errors[500, 0], errors[-1, 0]
-    assert at_marker == pytest.approx(before, abs=0.06)  # the position stays where the marker was first seen
-    assert after == pytest.approx(at_marker, abs=0.1)  # and goes on by its velocity for a while
+    assert at_marker == pytest.approx(before, abs=0.04)  # the position stays where the marker was first seen
+    assert after == pytest.approx(at_marker, abs=0.06)  # and goes on by its velocity for a while
 
 
 def test_a_marker_is_found_where_it_is() -> None:
