@@ -10,8 +10,9 @@ from rich.console import Console
 
 from tests.cli.test_cli import _run
 from tests.link.fake_vehicle import FakeVehicle
-from tests.link.wires import UdpWire, free_udp_port
+from tests.link.wires import UdpWire
 from uasfly.cli.output import preflight_table
+from uasfly.link.ports import free_udp_port
 
 # What depends on the speed of this machine is made easy, so that the exit code does not.
 EASY = ("--controller", "pid", "--set", "mission.monitors.telemetry.stale_s=0.5")

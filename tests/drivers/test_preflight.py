@@ -13,7 +13,7 @@ import pytest
 
 from tests.drivers.test_live_faults import HoveringLink, _prepare
 from tests.link.fake_vehicle import FakeVehicle
-from tests.link.wires import UdpWire, free_udp_port
+from tests.link.wires import UdpWire
 from uasfly.drivers import preflight
 from uasfly.drivers.flight import Flight, fly_flight
 from uasfly.drivers.live import fly
@@ -23,6 +23,7 @@ from uasfly.errors import LinkError
 from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot
 from uasfly.flight.preflight import PARAMETERS
+from uasfly.link.ports import free_udp_port
 from uasfly.messages import Array, FactsSample, NamedValue, Status
 from uasfly.preflight_messages import PreflightCheck, Verdict
 from uasfly.record.reader import LogReader

@@ -22,8 +22,8 @@ from tests.fuzz.file_targets import shelf
 from tests.fuzz.harness import Rng
 from tests.fuzz.link_target import check_sample
 from tests.fuzz.odd import choice
-from tests.link.wires import free_udp_port
 from uasfly.link.mavsdk_link import MavsdkLink
+from uasfly.link.ports import free_udp_port
 from uasfly.messages import OdometrySample, Setpoint
 from uasfly.sim.mavlink.process import start_process
 from uasfly.sim.scenario import Scenario

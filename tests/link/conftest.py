@@ -8,8 +8,9 @@ import pytest_asyncio
 
 from tests.link.fake_vehicle import FakeVehicle
 from tests.link.waiting import Pair
-from tests.link.wires import UdpWire, free_udp_port
+from tests.link.wires import UdpWire
 from uasfly.link.mavsdk_link import MavsdkLink
+from uasfly.link.ports import free_udp_port
 
 
 @pytest_asyncio.fixture

@@ -14,13 +14,13 @@ from mavsdk import System
 
 from tests.link.fake_vehicle import ARDUPILOT, GROUND_STATION, FakeVehicle
 from tests.link.waiting import PATIENCE_S, arrived, texts, until
-from tests.link.wires import SerialWire, TcpClientWire, TcpWire, UdpWire, free_udp_port
+from tests.link.wires import SerialWire, TcpClientWire, TcpWire, UdpWire
 from uasfly.errors import LinkError
 from uasfly.link import bridge, upkeep
 from uasfly.link.bridge import HeardSystem
 from uasfly.link.finding import refuse_several
 from uasfly.link.mavsdk_link import MavsdkLink
-from uasfly.link.ports import check_available
+from uasfly.link.ports import check_available, free_udp_port
 from uasfly.link.urls import parse_url
 from uasfly.messages import OdometrySample, Request, RequestKind
 

@@ -11,10 +11,11 @@ import pytest
 
 from tests.link.fake_vehicle import FakeVehicle, mavlink
 from tests.link.waiting import Pair, arrived, texts, until
-from tests.link.wires import UdpWire, free_udp_port
+from tests.link.wires import UdpWire
 from tests.winds import wind_estimate
 from uasfly.errors import LinkError
 from uasfly.link.mavsdk_link import MavsdkLink
+from uasfly.link.ports import free_udp_port
 from uasfly.link.protocol import VehicleLink
 from uasfly.messages import FlightMode, OdometrySample, Setpoint, TextSample, TruthSample, VehicleSample
 

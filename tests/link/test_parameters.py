@@ -14,10 +14,11 @@ import pytest
 from tests.link.fake_vehicle import FakeVehicle
 from tests.link.test_commands import Wire
 from tests.link.waiting import Pair, arrived
-from tests.link.wires import UdpWire, free_udp_port
+from tests.link.wires import UdpWire
 from uasfly.errors import LinkError
 from uasfly.link.mavsdk_link import MavsdkLink
 from uasfly.link.parameters import READS, READS_IN_FLIGHT, ParameterChannel, parameter_value
+from uasfly.link.ports import free_udp_port
 
 INTERVAL_S = 0.02
 REAL32 = 9

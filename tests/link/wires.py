@@ -152,10 +152,3 @@ class SerialWire:
         """Close for good."""
         os.close(self._vehicle)
         os.close(self._link)
-
-
-def free_udp_port() -> int:
-    """A port that nobody uses at this moment."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

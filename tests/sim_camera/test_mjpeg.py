@@ -13,6 +13,7 @@ import pytest
 
 from tests.sim_camera import views
 from uasfly.errors import LinkError
+from uasfly.link.ports import free_udp_port
 from uasfly.sim.camera import mjpeg
 from uasfly.sim.camera.mjpeg import MjpegServer
 
@@ -233,7 +234,9 @@ def test_a_vehicle_over_mavlink_has_its_camera_beside_it() -> None:
     settings = views.clean(bundle={"on": "floor", "position_m": (0.0, 0.0, 0.0)})
     plant = load_file(find_file("plant", "f550"), Plant)
     scenario = Scenario(name="test", camera=settings)
-    with start_process(plant, scenario, 1, remote_port=_free_port(), camera=camera, bundle=views.single()) as vehicle:
+    with start_process(
+        plant, scenario, 1, remote_port=free_udp_port(), camera=camera, bundle=views.single()
+    ) as vehicle:
         grabber = MjpegGrabber(vehicle.camera_url)
         times = []
         for _ in range(5):
@@ -246,9 +249,3 @@ def test_a_vehicle_over_mavlink_has_its_camera_beside_it() -> None:
     assert np.ravel(detector.detectMarkers(image)[1]).tolist() == [5]
     with pytest.raises(OSError, match="refused"):
         socket.create_connection(("127.0.0.1", int(vehicle.camera_url.split(":")[2].split("/")[0])), timeout=1.0)
-
-
-def _free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

@@ -14,7 +14,7 @@ from typing import Any
 
 from uasfly.bench.link import CONNECT_TIMEOUT_S, SYSTEM_ID
 from uasfly.bench.timing import Figures
-from uasfly.drivers.flight import SWITCH_INTERVAL_S, free_port
+from uasfly.drivers.flight import SWITCH_INTERVAL_S
 from uasfly.drivers.live import fly
 from uasfly.drivers.plan import FlightPlan, build_pilot
 from uasfly.drivers.preflight import gather_facts, time_solver
@@ -22,6 +22,7 @@ from uasfly.drivers.watching import Cycle
 from uasfly.errors import UasflyError
 from uasfly.flight.choices import Engage
 from uasfly.link.mavsdk_link import MavsdkLink
+from uasfly.link.ports import free_udp_port
 from uasfly.messages import Phase, Sample, Setpoint, Status
 from uasfly.sim.mavlink.process import start_process
 
@@ -112,7 +113,7 @@ def measure_cycle(plan: FlightPlan, cycles: int, told: Callable[[float], None]) 
     """
     assert plan.plant is not None
     assert plan.scenario is not None
-    watcher, port = Watcher(cycles, told), free_port()
+    watcher, port = Watcher(cycles, told), free_udp_port()
     switch_interval = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     try:

@@ -9,10 +9,11 @@ import sys
 import time
 
 from uasfly.bench.timing import Figures, as_in_flight
-from uasfly.drivers.flight import SWITCH_INTERVAL_S, free_port
+from uasfly.drivers.flight import SWITCH_INTERVAL_S
 from uasfly.drivers.plan import FlightPlan
 from uasfly.errors import LinkError
 from uasfly.link.mavsdk_link import MavsdkLink
+from uasfly.link.ports import free_udp_port
 from uasfly.messages import OdometrySample, Setpoint
 from uasfly.sim.mavlink.process import start_process
 
@@ -32,7 +33,7 @@ def measure_link(plan: FlightPlan, duration_s: float) -> Figures:
     """
     assert plan.plant is not None
     assert plan.scenario is not None
-    port = free_port()
+    port = free_udp_port()
     relay = subprocess.Popen(
         [sys.executable, "-m", "uasfly.bench.link_relay", str(port)],
         stdin=subprocess.PIPE,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import signal
-import socket
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -25,6 +24,7 @@ from uasfly.errors import UasflyError
 from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot
 from uasfly.link.mavsdk_link import MavsdkLink
+from uasfly.link.ports import free_udp_port
 
 CONNECT_TIMEOUT_S = 10.0
 LISTEN_S = 2.5  # for a second vehicle: two heartbeats and a half
@@ -112,7 +112,7 @@ def _fly_simulated(prepared: _Prepared) -> dict[str, Any]:
     plan = prepared.plan
     assert plan.scenario is not None
     assert plan.plant is not None
-    port = free_port()
+    port = free_udp_port()
     prepared.say(f"simulated {plan.airframe.name} in {plan.scenario.name}, seed {plan.seed}")
     scenario, scene, camera = plan.scenario, None, None
     if plan.sight is not None and plan.sight.source is None and plan.sight.scene is not None:
@@ -183,10 +183,3 @@ def _engage(flight: Flight) -> Engage:
         return Engage(flight.engage)
     except ValueError:
         raise UasflyError(f"--engage: expected auto or pilot, found {flight.engage!r}") from None
-
-
-def free_port() -> int:
-    """A UDP port on loopback that nobody has just now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

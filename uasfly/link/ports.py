@@ -1,4 +1,4 @@
-"""Whether a port can be opened, asked before MAVSDK gets it: MAVSDK shares a busy port without a word."""
+"""Whether a port can be opened, asked before MAVSDK gets it: it shares a busy one without a word. And a free one."""
 
 from __future__ import annotations
 
@@ -6,9 +6,31 @@ import errno
 import os
 import socket
 from pathlib import Path
+from random import SystemRandom
 
 from uasfly.errors import LinkError
 from uasfly.link.urls import ConnectionUrl
+
+# Below what systems hand out to sockets that ask for no port of their own (Linux from 32768, others from 49152):
+# of those another program may have got one before it is opened here.
+FREE_PORTS = range(20000, 32000)
+ATTEMPTS = 100
+
+
+def free_udp_port() -> int:
+    """A UDP port on loopback that nobody has just now, nor gets by chance.
+
+    Raises:
+        LinkError: when none is found.
+    """
+    for port in SystemRandom().sample(FREE_PORTS, ATTEMPTS):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+            return port
+    raise LinkError(f"no free UDP port between {FREE_PORTS.start} and {FREE_PORTS.stop}: end other programs")
 
 
 def check_available(url: ConnectionUrl) -> None:

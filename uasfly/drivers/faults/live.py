@@ -9,7 +9,6 @@ import os
 import resource
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -24,6 +23,7 @@ from uasfly.drivers.faults.story import Story
 from uasfly.drivers.faults.wire import Wire
 from uasfly.drivers.plan import load_plan
 from uasfly.errors import FileError
+from uasfly.link.ports import free_udp_port
 from uasfly.messages import FlightMode
 from uasfly.record.reader import LogReader
 from uasfly.sim.mavlink.process import start_process
@@ -78,6 +78,7 @@ class _Program:
     def __init__(self, case: FaultCase, wire: Wire, folder: Path) -> None:
         self.problems: list[str] = []
         self.acted_s = math.nan
+        self._said_last = ""
         self._case = case
         self._wire = wire
         self._logs = folder / "logs"
@@ -112,6 +113,7 @@ class _Program:
             self.problems.append(f"the program does not end within {PATIENCE_S:.0f} s")
             self._process.kill()
             self._process.wait()
+        self._said_last = self._said()
         self._output.close()
 
     def fly(self) -> None:
@@ -140,7 +142,7 @@ class _Program:
             log = self._kept if self._kept.exists() else self._log
             story.read((entry.log_time_s, entry.message) for entry in LogReader(log).messages())
         except FileError as error:
-            self.problems.append(str(error))
+            self.problems.append(f"{error}; the program said:\n{self._said_last}")
         story.truths = self._wire.truths
         ended = bool(story.words) and story.words[-1][1] in ("completed", "aborted")
         if not ended and self._summary.exists():
@@ -202,10 +204,7 @@ def _on_the_wire(case: FaultCase, wire: Wire, fault_s: float, bounds: tuple[floa
 
 @contextlib.contextmanager
 def _wire() -> Iterator[Wire]:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = int(probe.getsockname()[1])
-    wire = Wire(port)
+    wire = Wire(free_udp_port())
     wire.start()
     try:
         yield wire
