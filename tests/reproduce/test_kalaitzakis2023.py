@@ -17,8 +17,8 @@ from uasfly.reproduce import kalaitzakis2023, report
 from uasfly.reproduce.kalaitzakis2023 import experiments as e
 from uasfly.reproduce.kalaitzakis2023 import flight
 from uasfly.reproduce.kalaitzakis2023.flight import Record, fly
-from uasfly.reproduce.kalaitzakis2023.results import all_rows, force_agrees, force_rows, mean_row
-from uasfly.reproduce.rows import Reproduction, Row
+from uasfly.reproduce.kalaitzakis2023.results import all_rows, force_agrees, force_rows
+from uasfly.reproduce.rows import SEEDS, Reproduction, Row, mean_row
 from uasfly.sim.scenario import Scenario
 
 SEED = 2
@@ -178,7 +178,7 @@ def test_all_seeds_of_all_experiments_are_flown(short: Record, monkeypatch: pyte
 
     monkeypatch.setattr(kalaitzakis2023, "fly", pretend)
     kalaitzakis2023.reproduce(7, lambda text, share: told.append(share))
-    assert len(flown) == e.SEEDS * (len(e.EXPERIMENTS) - 1) + 1
+    assert len(flown) == SEEDS * (len(e.EXPERIMENTS) - 1) + 1
     assert [seed for name, seed in flown if name == "head_wind"] == [7, 8, 9, 10, 11]
     assert told == sorted(told)
     assert told[-1] == 1.0

@@ -53,9 +53,19 @@ class Condition:
     share: float = 0.0
     redrawn_rad_s: float = 1.0
 
+    @property
+    def held_s(self) -> float:
+        """How long a draw stays [s]."""
+        return 2.0 * math.pi / self.redrawn_rad_s
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of a draw."""
+        return self.share / math.sqrt(3.0)
+
     def factors(self, rng: np.random.Generator, times_s: Array) -> list[SixFloats]:
         """The six 1 + delta at each of these times."""
-        draws = np.floor(times_s * self.redrawn_rad_s / (2.0 * math.pi)).astype(int)
+        draws = np.floor(times_s / self.held_s).astype(int)
         delta = np.zeros((draws.max() + 1, 6))
         delta[:, self.axes] = rng.uniform(-self.share, self.share, (len(delta), len(self.axes)))
         return [(row[0], row[1], row[2], row[3], row[4], row[5]) for row in (1.0 + delta[draws]).tolist()]

@@ -88,7 +88,7 @@ def observed(hover: Hover, white_m_s: float) -> Estimates:
         update = FuzzyDisturbanceObserver(FLOWN_BODY, design).update
         samples = zip(hover.times_s.tolist(), states, hover.inputs, strict=True)
         estimates[name] = np.array([update(*sample) for sample in samples])[settled]
-    return Estimates(hover.times_s[settled], hover.truth[settled], estimates)
+    return Estimates(hover.times_s[settled], hover.truth[settled], hover.inputs[settled], estimates)
 
 
 def noise_for(hover: Hover, design: str, rmse_n: float) -> float:

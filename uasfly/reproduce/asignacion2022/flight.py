@@ -71,11 +71,13 @@ class Estimates:
     Attributes:
         times_s: (n,).
         truth: (n, 6) force in the world [N], torque in the body [N m].
+        inputs: (n, 6) virtual inputs, in the same units; as the observers know them.
         estimates: observer's name -> (n, 6).
     """
 
     times_s: Array
     truth: Array
+    inputs: Array
     estimates: Mapping[str, Array]
 
     def rmse(self, name: str) -> Array:
@@ -83,18 +85,26 @@ class Estimates:
         error: Array = np.sqrt(np.mean((self.estimates[name] - self.truth) ** 2, axis=0))
         return error
 
+    def input_rms(self) -> Array:
+        """(6,) root of the mean square of the virtual inputs."""
+        size: Array = np.sqrt(np.mean(self.inputs**2, axis=0))
+        return size
+
 
 def watched(samples: Iterator[Sample], body: SixAxisBody, told: Callable[[float], None]) -> Estimates:
     """Let both of the paper's designs watch a flight, without sensor noise; `told` hears the time now and then."""
     observers = {name: FuzzyDisturbanceObserver(body, design) for name, design in DESIGNS.items()}
     times: list[float] = []
     truth: list[Array] = []
+    inputs: list[Array] = []
     estimates: dict[str, list[Array]] = {name: [] for name in observers}
     for number, sample in enumerate(samples):
         times.append(sample.time_s)
         truth.append(sample.disturbance)
+        inputs.append(sample.mean_inputs)
         for name, observer in observers.items():
             estimates[name].append(observer.update(sample.time_s, sample.state, sample.mean_inputs))
         if number % 250 == 0:
             told(sample.time_s)
-    return Estimates(np.array(times), np.array(truth), {name: np.array(rows) for name, rows in estimates.items()})
+    found = {name: np.array(rows) for name, rows in estimates.items()}
+    return Estimates(np.array(times), np.array(truth), np.array(inputs), found)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from uasfly.messages import Array
 from uasfly.reproduce.asignacion2022 import pictures
 from uasfly.reproduce.asignacion2022.conditions import BODY, DC1, DC2, DC3, GUST_HZ, SPIRAL, gust, sine
 from uasfly.reproduce.asignacion2022.experiment import (
@@ -22,7 +23,8 @@ from uasfly.reproduce.asignacion2022.flight import DESIGNS, Estimates, flown, wa
 from uasfly.reproduce.asignacion2022.sensors import USUAL_VELOCITY_M_S
 from uasfly.reproduce.asignacion2022.sines import Response, response
 from uasfly.reproduce.asignacion2022.steps import ACCELERATION, ACCELERATION_FAST, EXTENDED, Steps, compare_steps
-from uasfly.reproduce.rows import Progress, Reproduction, Row
+from uasfly.reproduce.asignacion2022.uncertainty import least_input
+from uasfly.reproduce.rows import SEEDS, Progress, Reproduction, Row, holds_in, mean_row
 from uasfly.wind.six_axes import AXES
 
 CONDITIONS = (DC1, DC2, DC3)
@@ -51,23 +53,28 @@ def reproduce(seed: int, progress: Progress, durations: Durations | None = None)
     """Fly all experiments of the paper.
 
     Args:
-        seed: of uncertainty, gusts and sensor noise.
+        seed: of gusts and sensor noise, and the first of five of the uncertainty.
         progress: told what is being flown.
         durations: the usual ones when not given.
     """
     durations = durations or Durations()
-    whole_s = 3.0 * durations.spiral_s + durations.sine_s + durations.experiment_s + SETTLED_S
+    flights = [
+        (number, condition, its_seed)
+        for number, condition in enumerate(CONDITIONS)
+        for its_seed in range(seed, seed + (SEEDS if condition.axes else 1))
+    ]
+    whole_s = len(flights) * durations.spiral_s + durations.sine_s + durations.experiment_s + SETTLED_S
     done_s = 0.0
 
     def telling(text: str) -> Callable[[float], None]:
         before_s = done_s
         return lambda time_s: progress(text, (before_s + time_s) / whole_s)
 
-    spirals: dict[str, Estimates] = {}
-    for number, condition in enumerate(CONDITIONS):
-        rng = np.random.default_rng((seed, number))
-        samples = flown(BODY, SPIRAL, gust, durations.spiral_s, condition, rng)
-        spirals[condition.name] = watched(samples, BODY, telling(f"spiral, {condition.name}"))
+    spirals: dict[str, list[Estimates]] = {}
+    for number, condition, its_seed in flights:
+        samples = flown(BODY, SPIRAL, gust, durations.spiral_s, condition, np.random.default_rng((its_seed, number)))
+        text = f"spiral, {condition.name}, seed {its_seed}"
+        spirals.setdefault(condition.name, []).append(watched(samples, BODY, telling(text)))
         done_s += durations.spiral_s
     samples = flown(BODY, SPIRAL, sine, durations.sine_s, DC1, np.random.default_rng((seed, 3)))
     waves = watched(samples, BODY, telling("spiral, sine"))
@@ -84,7 +91,7 @@ def reproduce(seed: int, progress: Progress, durations: Durations | None = None)
         *_step_rows(steps),
         *_experiment_rows(hover, white_m_s, inferred),
     )
-    drawn = {name.lower(): pictures.estimates(name, found) for name, found in spirals.items()}
+    drawn = {name.lower(): pictures.estimates(name, found[0]) for name, found in spirals.items()}
     drawn |= {
         "bode": pictures.bode(_lags(waves)),
         "step": pictures.steps(steps),
@@ -93,28 +100,53 @@ def reproduce(seed: int, progress: Progress, durations: Durations | None = None)
     return Reproduction("asignacion2022", rows, drawn)
 
 
-def _spiral_rows(spirals: dict[str, Estimates]) -> Iterator[Row]:
-    for name, found in spirals.items():
-        errors = {design: found.rmse(design) for design in DESIGNS}
+def _spiral_rows(spirals: Mapping[str, Sequence[Estimates]]) -> Iterator[Row]:
+    for name, flights in spirals.items():
+        errors = {design: np.array([found.rmse(design) for found in flights]) for design in DESIGNS}
         for design, values in errors.items():
             for number, axis in enumerate(AXES):
-                unit = "N" if number < 3 else "N m"
-                yield Row(name, f"RMSE {axis}, {design}", unit, None, float(values[number]), None)
+                yield mean_row(name, f"RMSE {axis}, {design}", _unit(number), None, values[:, number], "")
         for number, axis in enumerate(AXES):
-            ratio = float(errors["DP2"][number] / errors["DP1"][number])
-            yield Row(name, f"RMSE {axis}, DP2 / DP1", "", None, ratio, None, _ordering(name, number, ratio))
+            ratios = errors["DP2"][:, number] / errors["DP1"][:, number]
+            yield mean_row(name, f"RMSE {axis}, DP2 / DP1", "", None, ratios, _ordering(name, number, ratios))
+    yield from _uncertain_rows(spirals[DC1.name][0], spirals[DC2.name])
 
 
-def _ordering(condition: str, axis: int, ratio: float) -> str:
+def _unit(axis: int) -> str:
+    return "N" if axis < 3 else "N m"
+
+
+def _ordering(condition: str, axis: int, ratios: Array) -> str:
     if condition == DC2.name and axis not in DC2.axes:
         return "this axis has no uncertainty"
-    lower = _LOWER[condition]
-    note = f"paper: {lower} is the lower, {'below' if lower == 'DP2' else 'above'} 1; "
-    if (ratio < 1.0) == (lower == "DP2"):
-        return note + "so here"
-    if condition == DC2.name:
-        return note + "NOT so here: what is uncertain is little more than what balances the gust, so DP1 lags as much"
-    return note + "NOT so here"
+    below = _LOWER[condition] == "DP2"
+
+    def holds(ratio: float) -> bool:
+        return (ratio < 1.0) == below
+
+    so = "so here" if holds(float(ratios.mean())) else "NOT so here"
+    if len(ratios) > 1:
+        so += f" in the mean, {holds_in(ratios, holds)}"
+    return f"paper: {_LOWER[condition]} is the lower, {'below' if below else 'above'} 1; {so}"
+
+
+def _uncertain_rows(certain: Estimates, flights: Sequence[Estimates]) -> Iterator[Row]:
+    """Why the ordering of DC2 comes out on one axis and not on another."""
+    low, high = certain.rmse("DP1"), certain.rmse("DP2")
+    for axis in DC2.axes:
+        least = least_input(
+            DC2,
+            (DESIGNS["DP1"].cutoff_rad_s, float(low[axis])),
+            (DESIGNS["DP2"].cutoff_rad_s, float(high[axis])),
+        )
+        gust_rms = float(np.sqrt(np.mean(certain.truth[:, axis] ** 2)))
+        title, unit = f"RMS of what is uncertain, {AXES[axis]}", _unit(axis)
+        note = (
+            f"DP1 is the lower from {least:.3g} {unit} on, by theory; balancing the gust takes {gust_rms:.3g}, "
+            "the rest is the spiral, whose size the paper does not state"
+        )
+        flown_rms = [found.input_rms()[axis] for found in flights]
+        yield mean_row(DC2.name, title, unit, None, flown_rms, note)
 
 
 def _lags(waves: Estimates) -> dict[str, Response]:

@@ -5,7 +5,8 @@
 How the uncertainty delta enters: the paper multiplies the *dynamics* of an axis by 1 + delta. The dynamics are its
 model (13), A x + B u, weight included in the virtual input; the gust d acts from outside and is what the observer is to
 find, so it is not multiplied. (Multiplied too, a well-controlled vehicle would feel next to nothing of delta, because u
-balances d, and DP2 would be the better one on most axes, which is not what the paper found.)
+balances d, and DP2 would be the better one on most axes, which is not what the paper found.) What other readings give:
+see `uasfly.reproduce.asignacion2022.uncertainty`.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from uasfly.drivers.plan import FlightPlan, load_plan
 from uasfly.drivers.sight import MODEL, NO_SIGHT, SightOptions
+from uasfly.reproduce.rows import SEEDS
 
-SEEDS = 5
 SOUND_UNTIL_S = 20.0  # after boot: the vehicle stands above the markers, or before the board, and has seen them
 FIELD_WIND_M_S = 8.0  # at 10 m, as in the scenario gusty
 PAPER_NODES, PAPER_INTERVAL_S = 60, 0.05

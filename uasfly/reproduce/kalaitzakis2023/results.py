@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from uasfly.messages import Array
 from uasfly.reproduce.kalaitzakis2023 import experiments as e
 from uasfly.reproduce.kalaitzakis2023.flight import Record
-from uasfly.reproduce.rows import Row
+from uasfly.reproduce.rows import Row, mean_row
 from uasfly.sim.scenario import Scenario
 from uasfly.sim.wind.settings import JetSchedule
 
@@ -59,41 +59,6 @@ def all_rows(records: Records, blowers: Scenario) -> tuple[Row, ...]:
         *_field_rows(records[e.FIELD]),
         *_step_rows(records),
     )
-
-
-def mean_row(
-    experiment: str,
-    quantity: str,
-    unit: str,
-    paper: float | None,
-    values: Sequence[float] | Array,
-    note: str,
-    *,
-    accepts: Callable[[float, float], bool] = lambda ours, theirs: ours <= theirs,
-) -> Row:
-    """A row of the flights' mean; the note begins with their spread.
-
-    Args:
-        experiment: see `Row`.
-        quantity: see `Row`.
-        unit: see `Row`.
-        paper: the paper's figure, None where it gives none.
-        values: one a flight.
-        note: what has to be known to compare.
-        accepts: whether uasfly's (first) is as good as the paper's.
-    """
-    figures = np.asarray(values, dtype=np.float64)
-    mean = float(figures.mean())
-    better = None if paper is None else accepts(mean, paper)
-    texts = (_spread(figures), note)
-    return Row(experiment, quantity, unit, paper, mean, better, "; ".join(text for text in texts if text))
-
-
-def _spread(values: Array) -> str:
-    if len(values) == 1:
-        return "one flight"
-    low, high, sigma = values.min(), values.max(), values.std(ddof=1)
-    return f"{len(values)} flights, sd {sigma:.2g}, {low:.3g} to {high:.3g}"
 
 
 def _marker_rows(walking: Sequence[Record], sound: Sequence[Record]) -> list[Row]:
