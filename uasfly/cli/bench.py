@@ -44,7 +44,8 @@ def bench(
     Example: [bold]uasfly bench --nodes 30,60 --recommend my_airframe.yaml[/]
     """
     from uasfly.airframe import Airframe
-    from uasfly.bench.airframe_file import find_target, write_recommendation
+    from uasfly.airframe_file import find_target
+    from uasfly.bench.airframe_file import write_recommendation
     from uasfly.bench.bench import BenchSettings, run_bench
     from uasfly.bench.report import as_json as plain
     from uasfly.cli.progress import BenchProgress
@@ -54,7 +55,7 @@ def bench(
     if recommend is not None and (airframe is not None or solver_only):
         other = "--airframe: the file it changes is the one that is measured" if airframe else "--solver-only"
         raise UasflyError(f"--recommend does not go with {other}")
-    target = None if recommend is None else find_target(recommend)
+    target = None if recommend is None else find_target(recommend, "--recommend")
     settings = BenchSettings(
         airframe=load_file(find_file("airframe", airframe or "f550") if target is None else target.source, Airframe),
         nodes=_numbers(nodes),

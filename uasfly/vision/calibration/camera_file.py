@@ -6,8 +6,6 @@ Comments that a calibration writes begin with its name ("# lens: ..."), so that 
 from __future__ import annotations
 
 import io
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from uasfly.camera import Camera
-from uasfly.errors import FileError
+from uasfly.file_writing import write_checked
 from uasfly.files import load_file
 
 FRESH = """\
@@ -86,26 +84,8 @@ def with_fields(text: str, fields: Mapping[str, object], kind: str, comments: li
 
 
 def write_camera(path: Path, text: str) -> Camera:
-    """Check a text as a camera file beside its place, then move it there.
-
-    Raises:
-        FileError: it cannot be written, or is no camera file.
-    """
-    beside = None
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=".yaml", dir=path.absolute().parent)
-        beside = Path(name)
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        camera = load_file(beside, Camera)
-        beside.chmod(path.stat().st_mode & 0o777 if path.exists() else 0o644)
-        beside.replace(path)
-    except OSError as error:
-        raise FileError(str(path), [f"the camera file cannot be written: {error.strerror or error}"]) from None
-    finally:
-        if beside is not None:
-            beside.unlink(missing_ok=True)
-    return camera
+    """Write the text of a camera file, see `write_checked`."""
+    return write_checked(path, text, Camera)
 
 
 def _put(place: Any, name: str, value: object) -> None:
