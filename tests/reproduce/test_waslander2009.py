@@ -12,17 +12,11 @@ import pytest
 from uasfly.errors import UasflyError
 from uasfly.frames import quaternion_from_euler, rotation_matrix, rotation_vector_from_quaternion
 from uasfly.messages import Array
-from uasfly.reproduce.rows import Reproduction
+from uasfly.reproduce import waslander2009
+from uasfly.reproduce.rows import SEEDS, Reproduction
 from uasfly.reproduce.waslander2009 import vehicle
-from uasfly.reproduce.waslander2009.experiments import (
-    BY_ACCELEROMETER,
-    BY_OBSERVER,
-    HOVER,
-    Extent,
-    compare,
-    flight_plans,
-)
-from uasfly.reproduce.waslander2009.flight import Record, fly
+from uasfly.reproduce.waslander2009.experiments import BY_ACCELEROMETER, BY_OBSERVER, HOVER, Extent, flight_plans
+from uasfly.reproduce.waslander2009.flight import PaperFlight, Record, fly
 from uasfly.reproduce.waslander2009.sensors import AS_LARGEST, PaperSensors
 
 SHORT = Extent(hover_s=6.0, straight_m=2.0, turns=0.25)
@@ -40,7 +34,7 @@ def hovers() -> dict[str, Record]:
 def short(hovers: dict[str, Record]) -> Reproduction:
     """Rows of the hovers; they stand for the other flights too, which only the command flies."""
     plans = flight_plans(SEED, SHORT)
-    return compare({key: hovers.get(key[1], hovers["pid_dd_wind"]) for key in plans}, SHORT)
+    return waslander2009.compare({key: [hovers.get(key[1], hovers["pid_dd_wind"])] * 2 for key in plans}, SHORT)
 
 
 def test_every_experiment_has_its_rows(short: Reproduction) -> None:
@@ -48,6 +42,7 @@ def test_every_experiment_has_its_rows(short: Reproduction) -> None:
     assert short.paper == "waslander2009"
     assert {row.experiment for row in short.rows} == {
         "hover",
+        "hover, stronger wind",
         "straight path",
         "circular path",
         "wind from accelerometers",
@@ -58,11 +53,29 @@ def test_every_experiment_has_its_rows(short: Reproduction) -> None:
         assert row.better == (None if row.paper is None else row.uasfly <= row.paper)
 
 
+def test_all_flights_are_flown_with_five_seeds(hovers: dict[str, Record], monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the given one on; progress goes up to one."""
+    flown: list[PaperFlight] = []
+    told: list[float] = []
+
+    def pretend(plan: PaperFlight) -> Record:
+        flown.append(plan)
+        return hovers["pid_dd_wind"]
+
+    monkeypatch.setattr(waslander2009, "fly", pretend)
+    rows = waslander2009.reproduce(7, lambda _, share: told.append(share)).rows
+    assert len(flown) == SEEDS * len(flight_plans(7, SHORT))
+    assert {plan.seed for plan in flown} == {7, 8, 9, 10, 11}
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    assert all(row.note.startswith("5 flights") for row in rows)
+
+
 def test_the_hover_has_the_papers_order(short: Reproduction) -> None:
     """PID, PID-DD, PID-DD with compensation: each strays less by RMS, the last within the paper's 0.1 m on all axes."""
     values = {row.quantity: row.uasfly for row in short.rows if row.experiment == HOVER}
     assert values["PID-DD + wind: RMS"] < values["PID-DD: RMS"] < values["PID: RMS"]
-    assert max(values[f"PID-DD + wind: largest deviation {axis}"] for axis in "xyz") <= 0.1
+    assert values["PID-DD + wind: largest deviation of an axis"] <= 0.1
 
 
 def test_the_filter_finds_the_wind_that_inversion_misses(short: Reproduction) -> None:
@@ -103,7 +116,7 @@ def test_legs_that_are_not_flown_to_their_end_are_an_error() -> None:
 def test_pictures_are_drawn_when_asked_for(short: Reproduction, tmp_path: Path) -> None:
     """Each a PNG of its own name."""
     pytest.importorskip("matplotlib")
-    assert set(short.pictures) == {"hover", "wind", "straight", "circle"}
+    assert set(short.pictures) == {"hover", "hover_stronger", "wind", "straight", "circle"}
     for stem, draw in short.pictures.items():
         draw(tmp_path / f"{stem}.png")
         assert (tmp_path / f"{stem}.png").read_bytes().startswith(b"\x89PNG")
@@ -162,10 +175,10 @@ def test_the_model_has_the_plants_coefficients_by_hand() -> None:
 
 def test_the_wind_is_the_papers_at_fifteen_knots() -> None:
     """7.72 m/s at 20 ft make 5.93 m/s at 2 m: 7.72 ln 40 / ln 121.9; the profile reaches far above."""
-    wind = vehicle.paper_scenario().wind
+    wind = vehicle.paper_scenario(vehicle.LIGHT_M_S).wind
     assert wind.gusts == "sum_of_sines"
     assert wind.mean.w20_m_s == pytest.approx(7.717, abs=1e-3)
     assert wind.mean.kind == "boundary_layer"
     assert wind.mean.speed_at_10_m_m_s * math.log(40.0) / math.log(200.0) == pytest.approx(5.926, abs=2e-3)
     assert wind.mean.top_m(45.0) > 100.0
-    assert vehicle.gust_density() == pytest.approx((0.389, 0.389, 0.668), abs=2e-3)
+    assert vehicle.gust_density(vehicle.LIGHT_M_S) == pytest.approx((0.389, 0.389, 0.668), abs=2e-3)

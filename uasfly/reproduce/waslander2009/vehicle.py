@@ -15,7 +15,9 @@ from uasfly.sim.wind.settings import TEN_METRES_M, TWENTY_FEET_M
 from uasfly.wind.accelerometer_model import AccelerometerModel
 
 VEHICLE = "f550"
-W20_M_S = 15.0 * 1852.0 / 3600.0  # light turbulence of MIL-F-8785C
+KNOT_M_S = 1852.0 / 3600.0
+LIGHT_M_S = 15.0 * KNOT_M_S  # at 20 ft: light turbulence of MIL-F-8785C
+STRONG_M_S = 20.0 * KNOT_M_S  # what 30 deg of tilt hold against, with some reserve for the gusts
 ROUGHNESS_M = 0.05
 TOWARD_DEG = 30.0
 HEIGHT_M = 2.0
@@ -41,20 +43,20 @@ def accelerometer_model(plant: Plant, scale: float = 1.0) -> AccelerometerModel:
     )
 
 
-def gust_density() -> tuple[float, float, float]:
+def gust_density(w20_m_s: float) -> tuple[float, float, float]:
     """Density of the random walk [m/s/sqrt(s)] with the power of the paper's gusts above their corner.
 
     A random walk of density q has q^2 / (pi Omega^2). Half of PSD_h, which is what the sum of sines carries, is
     sigma^2 / (pi L Omega^2) for large L Omega, half of PSD_v 3 sigma^2 / (2 pi L Omega^2).
     """
-    figures = low_altitude_parameters(HEIGHT_M, W20_M_S)
+    figures = low_altitude_parameters(HEIGHT_M, w20_m_s)
     horizontal = figures.sigma_u_m_s / math.sqrt(figures.length_u_m)
     return horizontal, horizontal, figures.sigma_w_m_s * math.sqrt(1.5 / figures.length_w_m)
 
 
-def paper_scenario() -> Scenario:
-    """The paper's wind; estimate and link as in the shipped scenarios."""
-    speed = W20_M_S * math.log(TEN_METRES_M / ROUGHNESS_M) / math.log(TWENTY_FEET_M / ROUGHNESS_M)
+def paper_scenario(w20_m_s: float) -> Scenario:
+    """The paper's wind, so strong at 20 ft; estimate and link as in the shipped scenarios."""
+    speed = w20_m_s * math.log(TEN_METRES_M / ROUGHNESS_M) / math.log(TWENTY_FEET_M / ROUGHNESS_M)
     return Scenario.model_validate(
         {
             "name": "waslander2009",
