@@ -16,8 +16,8 @@ What the paper's text states and what had to be assumed:
   through the Kalman filter, position and velocity from the vehicle's own estimate. With position and velocity from
   5 cm of white GPS noise at 10 Hz as well, that noise moves the vehicle more than the wind does; it is flown beside.
 - Attitude: gyro from the ground on, heading pulled to the magnetometer. The ground is level to 0.3 deg (sigma, drawn
-  for each flight; not the paper's). On one heading that cannot be told from the accelerometer's bias, and a degree of it
-  is 0.5 m/s of wind: flights with an RMSE above 0.5 m/s come of it (seeds 5 and 10, 0.7 and 1.2 deg: 0.56 and 0.69 m/s;
+  for each flight; not the paper's). On one heading that cannot be told from the accelerometer's bias, and a degree is
+  0.5 m/s of wind: flights with an RMSE above 0.5 m/s come of it (seeds 5 and 10, 0.7 and 1.2 deg: 0.56 and 0.69 m/s;
   on level ground 0.42 and 0.41).
 - Drag and flapping coefficients are those of the plant file at hover, as a bench test would give them; the thrust in
   wind is the paper's (constant power), which is not the plant's (constant speed).
