@@ -27,14 +27,15 @@ def write_checked(path: Path, text: str, model: type[M]) -> M:
         FileError: it cannot be written, or is not what the model describes.
     """
     beside = None
+    place = path.resolve()  # a link stays one
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=".yaml", dir=path.absolute().parent)
+        handle, name = tempfile.mkstemp(prefix=f".{place.stem}-", suffix=".yaml", dir=place.parent)
         beside = Path(name)
         with os.fdopen(handle, "w", encoding="utf-8", newline="") as stream:
             stream.write(text)
         checked = _checked(beside, path, model)
-        beside.chmod(path.stat().st_mode & 0o777 if path.exists() else 0o644)
-        beside.replace(path)
+        beside.chmod(place.stat().st_mode & 0o777 if place.exists() else 0o644)
+        beside.replace(place)
     except OSError as error:
         raise FileError(str(path), [f"it cannot be written: {error.strerror or error}"]) from None
     finally:

@@ -50,6 +50,17 @@ def test_the_numbers_of_a_section_change_and_nothing_else(tmp_path: Path) -> Non
     assert (wind.drag_1_s, wind.drag_1_m, wind.drag_sigma_share, wind.tilt_sigma_rad) == (0.2, 0.015, 0.031, 0.004)
 
 
+def test_through_a_link_the_file_behind_it_is_written(tmp_path: Path) -> None:
+    """The link stays."""
+    (tmp_path / "fleet").mkdir()
+    file, link = tmp_path / "fleet" / "f550_3.yaml", tmp_path / "mine.yaml"
+    file.write_text(TEXT, encoding="utf-8")
+    link.symlink_to(file)
+    write_drag(_target(link), FOUND)
+    assert link.is_symlink()
+    assert file.read_text(encoding="utf-8") == TEXT.replace(SHIPPED, f"{LINE} # identified")
+
+
 @pytest.mark.parametrize(("cut", "ending"), [(0, "\n"), (1, "\n"), (0, "\r\n")])
 def test_a_file_without_the_section_gets_it_at_its_end(tmp_path: Path, cut: int, ending: str) -> None:
     """Behind an empty line, with the file's line ends, whether its last line has one or not."""
