@@ -28,7 +28,7 @@ What the paper's text states and what had to be assumed:
 - Seeds: figures are means of five, the one that is asked for and the ones after it: a single flight tells by chance
   which of two controllers is the better where they are near each other.
 - Gains: by one rule for all three controllers, see `uasfly.control.position_gains`; the paper gives none. Height keeps
-  the airframe file's, so PID and PID-DD stray alike there, and are level by the largest deviation where that is height's.
+  the airframe file's, so PID and PID-DD stray alike there, and by the largest deviation where that is height's.
   Tried with seeds 1 to 5: a double derivative on height (0.26 or 0.5) lets PID-DD stray up to 2.5 cm more. The rule's
   gains on height (for 0.08 s of lag) leave 2 to 6 cm there; the largest deviations are then 11.6, 6.5 and 6.4 cm in
   15 knots and 23.8, 10.7 and 8.6 in 20, in the paper's order.
