@@ -12,7 +12,9 @@ from uasfly.errors import FileError
 from uasfly.messages import Array
 from uasfly.vision.detectors import Image, border_of
 
-LEAST_CELL_PX = 1.0  # nothing with smaller cells could be read; the outline of a turned one has up to a third fewer pixels
+LEAST_CELL_PX = (
+    1.0  # nothing with smaller cells could be read; the outline of a turned one has up to a third fewer pixels
+)
 
 
 class OpenCvDetector:
@@ -70,7 +72,7 @@ class OpenCvDetector:
 
     def find(self, grey: Image) -> list[tuple[int, Array]]:
         """Ids and corners (4, 2) [px], as `Detector` says."""
-        # OpenCV counts in shares of the picture: in a small part of it every speck would be looked at, for half a second
+        # OpenCV counts in shares of the picture: in a small part of it every speck would be looked at
         self._parameters.minMarkerPerimeterRate = self._least_px / max(grey.shape)
         self._detector.setDetectorParameters(self._parameters)
         corners, ids, _ = self._detector.detectMarkers(grey)
