@@ -12,9 +12,7 @@ from uasfly.errors import FileError
 from uasfly.messages import Array
 from uasfly.vision.detectors import Image, border_of
 
-LEAST_CELL_PX = (
-    1.0  # nothing with smaller cells could be read; the outline of a turned one has up to a third fewer pixels
-)
+LEAST_CELL_PX = 1.0  # smaller ones cannot be read; the outline of a turned marker has up to a third fewer pixels
 
 
 class OpenCvDetector:
