@@ -211,7 +211,7 @@ def test_settings_of_the_experiments_reach_their_files() -> None:
     assert field.sight.modelled
     assert field.scenario is not None
     assert field.scenario.sensors.gnss is not None
-    assert field.scenario.sensors.gnss.walk_from_s == 20.0
+    assert field.scenario.sensors.gnss.walk_from_s == 5.0
     assert field.scenario.wind.mean.kind == "boundary_layer"
     assert field.scenario.wind.mean.toward_deg == 90.0
 

@@ -122,17 +122,18 @@ def test_gnss_walks_as_the_paper_says() -> None:
 
 
 def test_gnss_is_sound_until_it_walks() -> None:
-    """With `walk_from_s` the bias stays as it begins until then."""
+    """With `walk_from_s` the bias stays as it begins until the vehicle has been in offboard for so long."""
     gnss = Gnss(white_sigma_m=0.0, random_walk_m_sqrt_s=0.2, initial_bias_m=(1.0, 0.0, 0.0), walk_from_s=1.0)
     sensors = Sensors.model_validate(
         {**QUIET.model_dump(), "position": "gnss", "position_noise_m": None, "gnss": gnss, "position_rate_hz": 10.0}
     )
     estimate = Estimate(sensors, np.random.default_rng(1), state_at(0.0), STEP)
     biases = []
-    for _ in range(round(2.0 / STEP)):
+    for step in range(round(3.0 / STEP)):
         biases.append(estimate.position_bias)
+        estimate.engaged_for_s = step * STEP - 1.0 if step * STEP >= 1.0 else None
         estimate.advance()
-    last_sound = round(1.0 / STEP)
+    last_sound = round(2.0 / STEP)
     assert set(biases[:last_sound]) == {(1.0, 0.0, 0.0)}
     assert len(set(biases[last_sound:])) >= 10
 

@@ -14,6 +14,7 @@ from uasfly.bench.acados_process import AcadosProcess, AcadosUnavailableError, f
 from uasfly.bench.cases import NODES, SATURATED, most_nodes
 from uasfly.bench.contestants import LIBRARY, AcadosSolver, Contestant, UasflySolver
 from uasfly.bench.cycle import CycleFigures, measure_cycle
+from uasfly.bench.detection import DetectionBench, DetectionFigures
 from uasfly.bench.link import measure_link
 from uasfly.bench.observer import ObserverFigures, measure_observer
 from uasfly.bench.recommend import Recommendation, recommend
@@ -32,7 +33,8 @@ BACKENDS = ("c", "vm", LIBRARY)
 CLAIMED_NODES = (30, 60)  # sizes that get more blocks: their 99th percentiles are told in claims
 QUICK_NODES = CLAIMED_NODES
 SOLVER_SHARE = 0.6  # of the time that everything takes, for the progress bar
-FLIGHT_FROM = SOLVER_SHARE + 0.1
+FLIGHT_FROM, BESIDE_FROM = SOLVER_SHARE + 0.1, SOLVER_SHARE + 0.25
+DETECTION_ROUNDS = 24
 ATTEMPTS = 2
 OBSERVER_SAMPLES = 4000
 LINK_S, CYCLES_S = 4.0, 16.0
@@ -78,7 +80,8 @@ class BenchResult:
 
     Attributes:
         rows: of the solver's table. acados: version of its package.
-        observer, cycle, link: times. recommended: what the airframe file should set.
+        observer, detection, cycle, link: times. recommended: what the airframe file should set.
+        beside: the cycle's while markers are detected beside it at full load.
         own_share: of the time in which the solver ran, how much the processor really worked for it.
         remarks: what there is to say.
     """
@@ -86,7 +89,9 @@ class BenchResult:
     rows: list[SolverRow] = field(default_factory=list)
     acados: str | None = None
     observer: ObserverFigures | None = None
+    detection: DetectionFigures | None = None
     cycle: CycleFigures | None = None
+    beside: CycleFigures | None = None
     link: Figures | None = None
     recommended: Recommendation | None = None
     own_share: float | None = None
@@ -121,12 +126,34 @@ def run_bench(settings: BenchSettings, told: Told, *, solver_only: bool = False)
     cycles = round(CYCLES_S * settings.airframe.controller.rate_hz / (4.0 if settings.quick else 1.0))
 
     def flown(done: float) -> None:
-        told("whole cycle in a live flight", FLIGHT_FROM + (1.0 - FLIGHT_FROM) * done)
+        told("whole cycle in a live flight", FLIGHT_FROM + (BESIDE_FROM - FLIGHT_FROM) * done)
 
     result.cycle = _tried("cycle", lambda: measure_cycle(plan, cycles, flown), result.remarks)
+    _bench_detection(result, plan, cycles, settings, told)
     if result.cycle is not None:
         result.recommended = recommend(settings.airframe.controller, result.solver_p99_ms(), result.cycle.rest_p99_ms)
     return result
+
+
+def _bench_detection(result: BenchResult, plan: FlightPlan, cycles: int, settings: BenchSettings, told: Told) -> None:
+    """Marker detection, and the cycle beside it."""
+    told("marker detection", BESIDE_FROM)
+    rounds = DETECTION_ROUNDS // (4 if settings.quick else 1)
+    try:
+        bench = DetectionBench(SEED)
+        detection = result.detection = bench.measure(rounds)
+    except UasflyError as error:
+        result.remarks.append(str(error))
+        return
+
+    def flown(done: float) -> None:
+        told("whole cycle beside marker detection", BESIDE_FROM + (1.0 - BESIDE_FROM) * done)
+
+    def measure() -> CycleFigures:
+        with bench.running(detection):
+            return measure_cycle(plan, cycles, flown)
+
+    result.beside = _tried("cycle beside marker detection", measure, result.remarks)
 
 
 def _tried(what: str, measure: Callable[[], T], remarks: list[str]) -> T | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import selectors
 import sys
 import tempfile
 import time
@@ -32,8 +33,8 @@ class CycleFigures:
     """What a flight took.
 
     Attributes:
-        cycle: from the cycle's first look for samples to its next sleep [ms]: decoding, observer, controller, monitors,
-            the setpoint sent, the record handed to the log, the status to the view.
+        cycle: from the cycle's first look for samples to the event loop's next sleep [ms]: decoding, observer,
+            controller, monitors, the setpoint sent, the record handed to the log, the status to the view.
         solver: the solver in it [ms].
         to_setpoint: the part of the same cycles up to the setpoint, as a flight's summary counts them [ms].
         motion_to_setpoint: from when the newest motion was true to the setpoint that answers it [ms].
@@ -80,7 +81,7 @@ class Watcher:
 
 
 class TimedLink(MavsdkLink):
-    """The real link, which measures each cycle that sends a setpoint: from `poll` until the event loop is free."""
+    """The real link, which measures each cycle that sends a setpoint: from `poll` until the event loop sleeps."""
 
     watcher: Watcher
     _begun_s: float | None = None
@@ -90,7 +91,6 @@ class TimedLink(MavsdkLink):
         """See `MavsdkLink.poll`; the cycle begins here."""
         if self._begun_s is None:
             self._begun_s, self._sent = time.perf_counter(), False
-            asyncio.get_running_loop().call_soon(self._ended)  # when the cycle waits for the next one
         return super().poll()
 
     def send(self, setpoint: Setpoint) -> bool:
@@ -98,11 +98,24 @@ class TimedLink(MavsdkLink):
         self._sent = super().send(setpoint)
         return self._sent
 
-    def _ended(self) -> None:
-        assert self._begun_s is not None
-        elapsed_s, self._begun_s = time.perf_counter() - self._begun_s, None
-        if self._sent:
-            self.watcher.measured(1e3 * elapsed_s)
+    def sleeps(self) -> None:
+        """The event loop has nothing left to do: the cycle ends here."""
+        if self._begun_s is not None:
+            elapsed_s, self._begun_s = time.perf_counter() - self._begun_s, None
+            if self._sent:
+                self.watcher.measured(1e3 * elapsed_s)
+
+
+class _Bed(selectors.DefaultSelector):
+    """Where the event loop sleeps; tells before it does."""
+
+    link: TimedLink | None = None
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        """See `BaseSelector.select`."""
+        if self.link is not None:
+            self.link.sleeps()
+        return super().select(timeout)
 
 
 def measure_cycle(plan: FlightPlan, cycles: int, told: Callable[[float], None]) -> CycleFigures:
@@ -122,7 +135,9 @@ def measure_cycle(plan: FlightPlan, cycles: int, told: Callable[[float], None]) 
             start_process(plan.plant, plan.scenario, plan.seed, remote_port=port, local_port=0),
         ):
             log = Path(folder) / "flight.mcap"
-            summary = asyncio.run(_fly(plan, f"udpin://127.0.0.1:{port}", log, watcher))
+            bed = _Bed()
+            with asyncio.Runner(loop_factory=lambda: asyncio.SelectorEventLoop(bed)) as runner:
+                summary = runner.run(_fly(plan, f"udpin://127.0.0.1:{port}", log, watcher, bed))
     finally:
         sys.setswitchinterval(switch_interval)
     cycle, solver = Figures.of(watcher.cycles_ms), Figures.of(watcher.solves_ms)
@@ -132,7 +147,7 @@ def measure_cycle(plan: FlightPlan, cycles: int, told: Callable[[float], None]) 
     return CycleFigures(cycle, solver, to_setpoint, summary["latency_ms"])
 
 
-async def _fly(plan: FlightPlan, url: str, log: Path, watcher: Watcher) -> dict[str, Any]:
+async def _fly(plan: FlightPlan, url: str, log: Path, watcher: Watcher, bed: _Bed) -> dict[str, Any]:
     pilot = build_pilot(plan, Engage.AUTO, time.perf_counter, late_counts=True, preflight=True)
     solve_ms = time_solver(plan)
 
@@ -143,7 +158,7 @@ async def _fly(plan: FlightPlan, url: str, log: Path, watcher: Watcher) -> dict[
     watcher.end = end
     link = await TimedLink.connect(url, system_id=SYSTEM_ID, timeout_s=CONNECT_TIMEOUT_S, want_truth=False)
     assert isinstance(link, TimedLink)
-    link.watcher = watcher
+    link.watcher, bed.link = watcher, link
     try:
         return await fly(plan, pilot, link, log, watcher.watch, partial(gather_facts, link, solve_ms))
     finally:

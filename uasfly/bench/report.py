@@ -22,12 +22,14 @@ def computer() -> dict[str, object]:
 
 def as_json(result: BenchResult) -> dict[str, Any]:
     """The result as plain data; null for what was not measured."""
-    observer, cycle, link = result.observer, result.cycle, result.link
+    observer, cycle, link, beside = result.observer, result.cycle, result.link, result.beside
     return {
         "solver": [row.as_dict() for row in result.rows],
         "observer_ms": None if observer is None else observer.odometry.as_dict(),
         "observer_with_marker_ms": None if observer is None else observer.with_marker.as_dict(),
+        "detection_ms": None if result.detection is None else result.detection.as_dict(),
         "cycle_ms": None if cycle is None else cycle.cycle.as_dict(),
+        "cycle_beside_detection_ms": None if beside is None else beside.cycle.as_dict(),
         "cycle_to_setpoint_ms": None if cycle is None else cycle.to_setpoint.as_dict(),
         "motion_to_setpoint_ms": None if cycle is None else cycle.motion_to_setpoint,
         "link_ms": None if link is None else link.as_dict(),
@@ -63,12 +65,17 @@ def parts_table(result: BenchResult) -> Table | None:
     if result.observer is not None:
         rows.append(("observer, odometry: prediction, pose, velocity", result.observer.odometry.as_dict()))
         rows.append(("observer, the same and a marker", result.observer.with_marker.as_dict()))
+    if result.detection is not None:
+        rows.append(("marker detection, whole picture (640 x 480)", result.detection.whole.as_dict()))
+        rows.append(("marker detection, where it is expected", result.detection.region.as_dict()))
     if result.link is not None:
         rows.append(("link, telemetry out to setpoint in", result.link.as_dict()))
     if result.cycle is not None:
         rows.append(("whole cycle, all but sleeping", result.cycle.cycle.as_dict()))
         rows.append(("of it, up to the setpoint", result.cycle.to_setpoint.as_dict()))
         rows.append(("motion true to setpoint sent", result.cycle.motion_to_setpoint))
+    if result.beside is not None:
+        rows.append(("whole cycle, markers detected beside it", result.beside.cycle.as_dict()))
     if not rows:
         return None
     table = Table(title="The rest, in ms")

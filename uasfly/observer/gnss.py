@@ -24,6 +24,8 @@ LONGEST_ELAPSED_S = 0.2
 CONFIRMED_S = 0.1  # for so long it must go on: a single wrong position is no drift
 MEMORY_SAMPLES = 30.0  # samples that the filter's memory averages over; a wander does not average out
 
+_POSITION = s.SENSORS[s.POSITION_SENSOR]
+
 Vector = tuple[float, float, float]
 
 
@@ -85,7 +87,9 @@ class DriftWatch:
 
     def look(self, odometry: Odometry, verdicts: tuple[Verdict, ...]) -> None:
         """A sample, and what the gates said of it; a velocity that is refused proves nothing."""
-        agrees = all(v.accepted for v in verdicts if v.sensor != s.SENSORS[s.POSITION_SENSOR])
+        agrees = True
+        for verdict in verdicts:
+            agrees &= verdict.accepted or verdict.sensor == _POSITION
         elapsed = odometry.time_s - self._time_s
         if not 0.0 <= elapsed < LONGEST_ELAPSED_S:
             self._past.clear()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right, insort
+from bisect import bisect_left, bisect_right, insort
 
 _KEPT_S = 3.0  # s, more than the filter ever goes back
 _PRUNE_AT = 512  # entries
@@ -47,9 +47,7 @@ class ThrustHistory:
     def mean(self, start_s: float, end_s: float) -> float:
         """Mean acceleration [m/s^2] over [start_s, end_s]; where that is empty, what acts just before `end_s`."""
         entries = self._entries
-        index = len(entries) - 1
-        while index >= 0 and entries[index][0] >= end_s:
-            index -= 1
+        index = bisect_left(entries, (end_s,)) - 1
         total, upper = 0.0, end_s
         while index >= 0 and entries[index][0] > start_s:
             begin, value = entries[index]

@@ -18,7 +18,7 @@ import numpy as np
 from uasfly.frames import quaternion_from_rotation_vector, quaternion_product
 from uasfly.messages import OdometrySample
 from uasfly.sim.noise_rows import NoiseRows
-from uasfly.sim.scenario import Sensors
+from uasfly.sim.scenario import Gnss, Sensors
 
 CONVERGED_S = 2.0  # after boot; PX4's simulator needs 2.1 s until it has a heading and a position
 DEAD_RECKONING_S = 5.0  # EKF2_NOAID_TOUT
@@ -64,6 +64,7 @@ class Estimate:
         gyro_error: (3,) [rad/s], new in every step.
         gnss_available: whether GNSS (or motion capture) gives positions.
         reset_counter: grows when the position jumps.
+        engaged_for_s: time since the vehicle first went into offboard, None before; set from outside.
     """
 
     def __init__(self, sensors: Sensors, rng: np.random.Generator, plant_state: array[float], step_s: float) -> None:
@@ -91,6 +92,7 @@ class Estimate:
         self.gnss_available = True
         self.gnss_offset: Vector = (0.0, 0.0, 0.0)
         self.reset_counter = 0
+        self.engaged_for_s: float | None = None
         self.advance()
 
     def advance(self) -> None:
@@ -216,11 +218,16 @@ class Estimate:
         period = 1.0 / self._sensors.position_rate_hz
         self._next_position_s = max(self._next_position_s + period, now)
         gnss = self._sensors.gnss
-        if gnss is not None and now >= gnss.walk_from_s:
+        if gnss is not None and self._walks(gnss):
             walk = gnss.random_walk_m_sqrt_s * math.sqrt(period)
             self._bias = [b + walk * n for b, n in zip(self._bias, self._noise.row[_WALK], strict=True)]
         white, noise = self._sensors.position_white_sigma_m, self._noise.row[_POSITION]
         self._held = [b + white * n + offset for b, n, offset in zip(self._bias, noise, self.gnss_offset, strict=True)]
+
+    def _walks(self, gnss: Gnss) -> bool:
+        if gnss.walk_from_s is None:
+            return True
+        return self.engaged_for_s is not None and self.engaged_for_s >= gnss.walk_from_s
 
     def _drift_away(self) -> None:
         dt = self._step_s

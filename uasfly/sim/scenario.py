@@ -24,22 +24,26 @@ Delay = Annotated[float, Field(ge=0.0, le=1.0)]
 class Gnss(FileModel):
     """Virtual GNSS of Kalaitzakis & Vitzilaios 2023, eq. 11: p_gnss = p + b_k + w, b_k = b_{k-1} + v.
 
-    The walk v is a density, so that its growth does not depend on the rate; it begins with the simulation,
-    or `walk_from_s` later, as where GNSS is sound on the way to a structure.
+    The walk v is a density, so that its growth does not depend on the rate; it begins with the simulation, or
+    `walk_from_s` after the vehicle first went into offboard (as jets count), where GNSS is sound on the way there.
     (The paper's v, variance 1e-3 m^2 a sample, is 0.1 m/sqrt(s) at 10 Hz.)
     """
 
     white_sigma_m: Annotated[NonNegative, Field(description="sigma of w on each axis, in each new position")]
     random_walk_m_sqrt_s: Annotated[NonNegative, Field(description="[m/sqrt(s)] density of v on each axis")]
     initial_bias_m: Annotated[Vector, Field(description="b at the beginning, x, y, z")] = (0.0, 0.0, 0.0)
-    walk_from_s: Annotated[NonNegative, Field(description="after the start: until then b stays as it is")] = 0.0
+    walk_from_s: Annotated[
+        NonNegative | None, Field(description="in offboard: until then b stays as it is; null: it walks from the start")
+    ] = None
 
     def expected_rms_m(self, duration_s: float) -> float:
         """Root of the expected mean square of the three-dimensional error [m] over the first `duration_s` seconds.
 
-        An axis has b0^2 + q^2 (t - t0) + sigma_w^2 at time t after t0; q^2 (t - t0) averages to q^2 (T - t0)^2 / 2T.
+        They count as `walk_from_s` does. An axis has b0^2 + q^2 (t - t0) + sigma_w^2 at time t after t0; q^2 (t - t0)
+        averages to q^2 (T - t0)^2 / 2T.
         """
-        walk = self.random_walk_m_sqrt_s**2 * max(0.0, duration_s - self.walk_from_s) ** 2 / (2.0 * duration_s)
+        walking_s = max(0.0, duration_s - (self.walk_from_s or 0.0))
+        walk = self.random_walk_m_sqrt_s**2 * walking_s**2 / (2.0 * duration_s)
         return math.sqrt(3.0 * (walk + self.white_sigma_m**2) + sum(b * b for b in self.initial_bias_m))
 
 

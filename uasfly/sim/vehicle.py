@@ -157,7 +157,8 @@ class SimulatedVehicle:
         autopilot.stabilise()
         x, y, z, vx, vy, vz = state[0:6]
         engaged = autopilot.engaged_at_s
-        air = self._wind.step((x, y, z), (vx, vy, vz), None if engaged is None else now - engaged)
+        engaged_for_s = None if engaged is None else now - engaged
+        air = self._wind.step((x, y, z), (vx, vy, vz), engaged_for_s)
         free = air.free_in_world
         if self._faults.wind != _STILL:
             east, north, up = self._faults.wind
@@ -167,6 +168,7 @@ class SimulatedVehicle:
         if not -_BEYOND < sum(state) < _BEYOND:
             raise UasflyError(self._run_away())
         self._steps = steps + 1
+        self._estimate.engaged_for_s = engaged_for_s
         self._estimate.advance()
         self._sensors.advance()
         if self.watcher is not None:

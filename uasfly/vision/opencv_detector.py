@@ -12,6 +12,8 @@ from uasfly.errors import FileError
 from uasfly.messages import Array
 from uasfly.vision.detectors import Image, border_of
 
+LEAST_CELL_PX = 1.0  # smaller ones cannot be read; the outline of a turned marker has up to a third fewer pixels
+
 
 class OpenCvDetector:
     """Finds the markers of one dictionary.
@@ -29,9 +31,10 @@ class OpenCvDetector:
 
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
-        parameters.minMarkerPerimeterRate = 0.02  # of the picture's longer side
         self.dictionary = dictionary
         self._border = border
+        self._least_px = 4.0 * LEAST_CELL_PX * (dictionary.markerSize + 2)
+        self._parameters = parameters
         self._detector = cv2.aruco.ArucoDetector(dictionary, parameters)
 
     @classmethod
@@ -67,6 +70,9 @@ class OpenCvDetector:
 
     def find(self, grey: Image) -> list[tuple[int, Array]]:
         """Ids and corners (4, 2) [px], as `Detector` says."""
+        # OpenCV counts in shares of the picture: in a small part of it every speck would be looked at
+        self._parameters.minMarkerPerimeterRate = self._least_px / max(grey.shape)
+        self._detector.setDetectorParameters(self._parameters)
         corners, ids, _ = self._detector.detectMarkers(grey)
         if ids is None:
             return []

@@ -9,7 +9,7 @@ seeds. What differs from the paper's experiments, or is not stated there:
   reference, all three axes together.
 - Markers: poses from the noise model that is held to rendered frames by a test; rendering the frames would take as long
   as the flights do. `uasfly rehearse marker_hover --scenario gnss_degraded --camera vga` flies by rendered ones.
-- GNSS walks by eq. 11, scaled to 1.28 m RMS expected over two minutes; what a flight meets differs from seed to seed.
+- GNSS walks by eq. 11, scaled to 1.28 m RMS expected over 137 s; what a flight meets differs from seed to seed.
   How wrong GNSS was when the markers were first seen decides where they, and everything, are in the world, and is not
   stated. Flown are a walk from the start on (the error as seen from the marker is the one that can be kept small) and
   one that begins when the vehicle stands above the markers.

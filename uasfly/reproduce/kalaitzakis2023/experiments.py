@@ -9,7 +9,6 @@ from uasfly.drivers.plan import FlightPlan, load_plan
 from uasfly.drivers.sight import MODEL, NO_SIGHT, SightOptions
 from uasfly.reproduce.rows import SEEDS
 
-SOUND_UNTIL_S = 20.0  # after boot: the vehicle stands above the markers, or before the board, and has seen them
 FIELD_WIND_M_S = 8.0  # at 10 m, as in the scenario gusty
 PAPER_NODES, PAPER_INTERVAL_S = 60, 0.05
 
@@ -32,7 +31,7 @@ class Experiment:
     once: bool = False
 
 
-_SOUND_FIRST = f"scenario.sensors.gnss.walk_from_s={SOUND_UNTIL_S:g}"
+_WALKING_AT_ONCE = "scenario.sensors.gnss.walk_from_s=null"
 _GUSTY_SIDE = (f"scenario.wind.mean.speed_at_10_m_m_s={FIELD_WIND_M_S:g}", "scenario.wind.mean.toward_deg=90")
 _PAPER_GRID = (
     f"airframe.controller.nodes={PAPER_NODES}",
@@ -45,10 +44,10 @@ FIELD, PAPER_GRID = "field", "paper_grid"
 SPIRALS = (SPIRAL_CALM, SPIRAL_SIDE, SPIRAL_UP, SPIRAL_DOWN)
 
 EXPERIMENTS: Mapping[str, Experiment] = {
-    MARKERS: Experiment("hover over markers", "marker_hover", "gnss_degraded", camera=True),
-    MARKERS_SOUND: Experiment(
-        "hover over markers", "marker_hover", "gnss_degraded", settings=(_SOUND_FIRST,), camera=True
+    MARKERS: Experiment(
+        "hover over markers", "marker_hover", "gnss_degraded", settings=(_WALKING_AT_ONCE,), camera=True
     ),
+    MARKERS_SOUND: Experiment("hover over markers", "marker_hover", "gnss_degraded", camera=True),
     BLOWER: Experiment("hover before a blower", "hover", "blower_hover"),
     HEAD: Experiment("back and forth, head wind", "back_and_forth", "head_wind"),
     SIDE: Experiment("back and forth, side gust", "back_and_forth", "side_gust"),
@@ -61,7 +60,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         "marker_standoff",
         "gnss_degraded",
         airframe="aurelia_x6",
-        settings=(_SOUND_FIRST, *_GUSTY_SIDE),
+        settings=_GUSTY_SIDE,
         camera=True,
     ),
     PAPER_GRID: Experiment("NMPC step", "hover", "blower_hover", settings=_PAPER_GRID, once=True),
