@@ -14,6 +14,7 @@ from dataclasses import field
 # ruff: noqa: PLC0414  (what sensors say and the type of arrays: everybody takes them from here)
 from uasfly.message_class import Array as Array
 from uasfly.message_class import message
+from uasfly.sensor_messages import AccelerometerSample as AccelerometerSample
 from uasfly.sensor_messages import AttitudeTargetSample as AttitudeTargetSample
 from uasfly.sensor_messages import BatterySample as BatterySample
 from uasfly.sensor_messages import MarkerSample as MarkerSample
@@ -161,6 +162,7 @@ class RequestResult:
 
 Sample = (
     OdometrySample
+    | AccelerometerSample
     | MarkerSample
     | AttitudeTargetSample
     | BatterySample

@@ -1,4 +1,4 @@
-"""What sensors say: PX4's estimate of its motion, marker poses, attitude targets, battery.
+"""What sensors say: PX4's estimate of its motion, accelerometer, marker poses, attitude targets, battery.
 
 They flow like the other messages, and everybody takes them from `uasfly.messages`; frames, units and times as there.
 """
@@ -27,6 +27,19 @@ class OdometrySample:
     quaternion_body_to_world: Array
     angular_rate_in_body: Array
     reset_counter: int = 0
+
+
+@message
+class AccelerometerSample:
+    """What the accelerometer reads (HIGHRES_IMU): the mean of the readings since the sample before.
+
+    Attributes:
+        time_s: the middle of that time.
+        specific_force_in_body: (3,) m/s^2, all forces but gravity over the mass; at rest (0, 0, 9.81).
+    """
+
+    time_s: float
+    specific_force_in_body: Array
 
 
 @message
