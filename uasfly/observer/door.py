@@ -117,7 +117,7 @@ def checked_sighting(sample: MarkerSample) -> Sighting | None:
 
 @message
 class SpecificForce:
-    """A usable AccelerometerSample: `force` (3,) [m/s^2], body."""
+    """A usable AccelerometerSample: `force` (3,) [m/s^2], body; for the filter without the bias."""
 
     time_s: float
     force: list[float]

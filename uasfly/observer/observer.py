@@ -26,17 +26,12 @@ from uasfly.messages import (
     VehicleSample,
 )
 from uasfly.observer import states as s
+from uasfly.observer.accelerometer import BiasWatch
 from uasfly.observer.agreement import Agreement
 from uasfly.observer.contact import LIGHT_M_S2, GroundContact
 from uasfly.observer.counters import Counters
 from uasfly.observer.diagnosis import Diagnosis, Journal
-from uasfly.observer.door import (
-    Odometry,
-    Sighting,
-    checked_accelerometer,
-    checked_odometry,
-    checked_sighting,
-)
+from uasfly.observer.door import Odometry, Sighting, checked_accelerometer, checked_odometry, checked_sighting
 from uasfly.observer.expected import expected_marker
 from uasfly.observer.glide import Glide
 from uasfly.observer.gnss import DriftWatch, Outage
@@ -96,6 +91,7 @@ class Observer:
         self._refused: dict[int, int] = {}
         self.retakes_moved = False
         self._outage = Outage(airframe.observer.velocity_sigma_m_s)
+        self._bias = BiasWatch()
         self._feels = airframe.observer.accelerometer_sigma_m_s2 is not None
         self._in_air = False
         self._in_air_s = -math.inf
@@ -111,10 +107,10 @@ class Observer:
                 self.counters.non_finite += 1
             if odometry is not None:
                 self._look_for_contact(odometry)
+                self._bias.move(odometry)
                 self._measure(self._outage.usable(odometry) if self._in_air and self._outage.active else odometry)
         elif isinstance(sample, AccelerometerSample):
-            if self._feels:
-                self._feel(sample)
+            self._feel(sample)
         elif isinstance(sample, MarkerSample):
             sighting = checked_sighting(sample)
             if sighting is None:
@@ -243,6 +239,11 @@ class Observer:
         return self._timeline.newest if self._timeline else None
 
     @property
+    def accelerometer_bias(self) -> tuple[float, float]:
+        """Bias of the accelerometer as learnt, along the body's x and y [m/s^2]."""
+        return self._bias.x, self._bias.y
+
+    @property
     def covariance(self) -> Array:
         """Covariance (n, n) of the error state (states.D_*, then six a marker) where the filter stands.
 
@@ -314,11 +315,16 @@ class Observer:
 
     def _feel(self, sample: AccelerometerSample) -> None:
         """A sample of the accelerometer: used in the air, where the filter stands; it never moves the filter's time."""
-        timeline, felt = self._timeline, checked_accelerometer(sample)
+        timeline = self._timeline
+        if timeline is None or not (self._feels and self._flies):
+            return
+        felt = checked_accelerometer(sample)
         if felt is None:
             self.counters.non_finite += 1
             return
-        if timeline is None or not self._flies:
+        felt = self._bias.corrected(felt)
+        if felt is None:
+            self.counters.rejected[s.ACCELEROMETER_SENSOR] += 1
             return
         behind_s = timeline.newest.time_s - felt.time_s
         if not abs(behind_s) < FELT_WITHIN_S or felt.time_s < timeline.oldest.time_s:

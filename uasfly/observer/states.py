@@ -124,8 +124,7 @@ IN_ACCELEROMETER = slice(45, 51)
 
 # Output of an accelerometer step beside the new packed state.
 OUT_FORCE_NIS, OUT_FORCE_ACCEPTED, OUT_FORCE_VARIANCE = range(3)  # the last: what the sample says of the variance
-OUT_FORCE_RESIDUAL = slice(3, 5)  # m/s^2, x and y
-ACCELEROMETER_OUTPUTS = 5
+ACCELEROMETER_OUTPUTS = 3
 
 # Output of an odometry step beside the new packed state.
 OUT_NIS = slice(0, 3)  # normalised innovation squared

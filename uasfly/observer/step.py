@@ -243,15 +243,13 @@ class Stepper:
         last_s = time_s - (time_s - before.time_s) / steps
         packed = self._predicted(before, last_s, before.rate) if steps > 1 else before.packed
         self._prepare_prediction(before, last_s, time_s, before.rate)
-        (x, y, z), (bias_x, bias_y) = measured.force, memory.bias
         variance = min(max(memory.variance, self._least_variance), GREATEST_VARIANCE)
-        inputs[s.IN_ACCELEROMETER] = (x - bias_x, y - bias_y, z, variance, variance, VERTICAL_VARIANCE)
+        inputs[s.IN_ACCELEROMETER] = (*measured.force, variance, variance, VERTICAL_VARIANCE)
         result = np.empty(packed.size)
         self._accelerometer_steps[len(before.markers)]((packed, inputs), (result, self._force_outputs))
-        nis, accepted, sample, residual_x, residual_y = self._force_outputs.tolist()
-        taken = accepted > 0.5
-        memory = memory.after(time_s, (residual_x, residual_y), sample, taken, self._window_s)
-        verdict = Verdict(s.ACCELEROMETER_SENSOR, nis, s.SENSOR_DOF, taken)
+        nis, accepted, sample = self._force_outputs.tolist()
+        memory = memory.after(time_s, sample, self._window_s)
+        verdict = Verdict(s.ACCELEROMETER_SENSOR, nis, s.SENSOR_DOF, accepted > 0.5)
         return replace(before, time_s=time_s, packed=result, measured=measured, accelerometer=memory), (verdict,)
 
     def _gusts(self, before: Moment, time_s: float, packed: Array, odometry: Odometry) -> Gusts:

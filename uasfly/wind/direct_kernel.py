@@ -57,7 +57,7 @@ def direct_kernel(density: float, level: int) -> DirectKernel:
     seen, told = _walk()
     unknown_seen, unknown_told = _unknown()
     squared = density**2
-    weights = np.linalg.solve(squared * seen + unknown_seen + noise, squared * told + unknown_told)
+    weights: Array = np.linalg.solve(squared * seen + unknown_seen + noise, squared * told + unknown_told).astype(float)
     of_integral = weights[:SAMPLES] - weights[:SAMPLES].mean()  # what the large variances cost in rounding:
     left = 1.0 - float(of_integral @ _TIMES) - float(weights[SAMPLES:].sum())
     of_felt: Array = weights[SAMPLES:] + left / FELT_SAMPLES  # a steady force comes out as it is

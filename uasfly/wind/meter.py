@@ -38,6 +38,7 @@ LONGEST_PAUSE_S = 0.3  # between samples; after a longer one the meter starts ag
 SHORTEST_STEP_S = 1e-3
 BELIEVED_M_S = 0.5  # a velocity farther from the estimate than this, and three sigmas, is an error of PX4's
 UNKNOWN_VELOCITY_M_S = 0.5  # with a velocity that is known no better the vehicle only believes what it knew of the wind
+CONTRADICTION_M_S2 = 0.3  # accelerometer against motion, over the window: several times its bias and the tilt's error
 CHANGE = 5  # intervals over which the force's change is looked at: a second
 CHANGE_MEMORY_S = 5.0
 FIRST_DENSITY = 0.5  # m/s^2/sqrt(s)
@@ -155,10 +156,11 @@ class WindMeter:
         level = None if newest_s is None else level_of(self._felt.sigma_m_s2(density))
         if newest_s is None or level is None or newest_s - WINDOW_S < self._times[0]:
             return None
-        kernel = direct_kernel(density, level)
-        slow = [kernel.of_integral @ self._on_grid(self._integral[:, axis], newest_s) for axis in range(2)]
-        fast = kernel.of_felt @ self._felt.up_to(newest_s)
-        east, north = float(slow[0] + fast[0]), float(slow[1] + fast[1])
+        kernel, felt = direct_kernel(density, level), self._felt.up_to(newest_s)
+        integral = np.column_stack([self._on_grid(self._integral[:, axis], newest_s) for axis in range(2)])
+        if np.abs(felt.mean(axis=0) - (integral[-1] - integral[0]) / WINDOW_S).max() > CONTRADICTION_M_S2:
+            return None
+        east, north = (kernel.of_integral @ integral + kernel.of_felt @ felt).tolist()
         return newest_s - DIRECT_LAG_S, (east, north), kernel.variance
 
     def _force_then(self, end_s: float, kernel: ForceKernel) -> tuple[float, Pair, float]:
