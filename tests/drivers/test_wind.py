@@ -63,8 +63,8 @@ def test_the_wind_in_a_gusty_hover_is_the_true_one(airframe: str) -> None:
     """8 m/s at 10 m with Dryden gusts, all sensors noisy: mean of 10 s, direction, gusts and sigmas.
 
     Speed to 0.3 m/s and direction to 4 degrees RMS, the present wind to 0.6 m/s (0.7 m/s when it is shown, some 60 ms
-    later), known within 5 s in the air and before offboard. The normalised errors stay below the upper bound of chi-square; errors of the attitude last, so that half
-    a minute is about four independent samples of the mean's.
+    later), known within 5 s in the air and before offboard. The normalised errors stay below the upper bound of
+    chi-square; errors of the attitude last, so that half a minute is about four independent samples of the mean's.
     """
     flown = Flown(airframe, ["mission.legs[0].duration_s=25"])
     assert flown.summary["outcome"] == "completed"
