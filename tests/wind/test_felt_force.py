@@ -75,5 +75,10 @@ def test_a_sample_ahead_of_the_attitude_waits() -> None:
     assert told.newest_s(12.0) == pytest.approx(11.98)
     told.take(np.array((12.02,)), level)
     assert told.newest_s(12.02) == pytest.approx(12.01)
+    told.add(AccelerometerSample(1e6, np.zeros(3)))  # a wrong time is not waited for
+    told.add(AccelerometerSample(math.nan, np.zeros(3)))
+    told.take(np.array((12.04,)), level)
+    told.take(np.array((1e6 + 1.0,)), level)
+    assert told.newest_s(12.03) == pytest.approx(12.01)
     told.forget()
     assert told.newest_s(12.02) is None

@@ -50,9 +50,11 @@ class FeltForce:
         ready, later = [], []
         for sample in self._fresh:
             x, y, _ = sample.specific_force_in_body.tolist()
-            if sample.time_s > times_s[-1]:
+            if times_s[-1] < sample.time_s < times_s[-1] + LONGEST_GAP_S:
                 later.append(sample)
-            elif sample.time_s > newest_s and abs(x) < LARGEST_M_S2 and abs(y) < LARGEST_M_S2:  # False for NaN
+            elif (
+                newest_s < sample.time_s <= times_s[-1] and abs(x) < LARGEST_M_S2 and abs(y) < LARGEST_M_S2
+            ):  # False for NaN
                 newest_s = sample.time_s
                 ready.append((newest_s, x, y))
         self._fresh = later
