@@ -159,7 +159,6 @@ def _odd_sample(rng: Rng, now_s: float) -> Sample:
         return TextSample(time_s, int(rng.integers(-3, 300)), choice(rng, ("", "x", "\x1b[2J", "é" * 300)))
     if kind == 8:
         return AccelerometerSample(time_s, vector())
-    if rng.random() < 0.05:
-        return LinkSample(time_s, LinkEvent.REBOOTED)
     request = Request(choice(rng, list(RequestKind)), number())
-    return RequestResult(time_s, request, bool(rng.integers(2)), "odd")
+    rebooted = LinkSample(time_s, LinkEvent.REBOOTED)
+    return rebooted if rng.random() < 0.05 else RequestResult(time_s, request, bool(rng.integers(2)), "odd")
