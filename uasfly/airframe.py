@@ -159,6 +159,10 @@ class ObserverNoise(FileModel):
     ] = 0.0
     attitude_correlation_s: Annotated[NonNegative, Field(description="position_correlation_s of the attitude")] = 0.0
     velocity_correlation_s: Annotated[NonNegative, Field(description="position_correlation_s of the velocity")] = 0.0
+    accelerometer_sigma_m_s2: Annotated[
+        Positive | None,
+        Field(description="noise of the mean of a control cycle's readings, in the rotors' plane; null: not used"),
+    ] = None
     matching_window_s: Annotated[Positive, Field(description="window of the covariance matching (eq. 8, 9)")]
 
 

@@ -11,8 +11,14 @@ import enum
 import math
 from dataclasses import field
 
-from uasfly.message_class import Array as Array  # noqa: PLC0414  (everybody takes it from here)
+# ruff: noqa: PLC0414  (what sensors say and the type of arrays: everybody takes them from here)
+from uasfly.message_class import Array as Array
 from uasfly.message_class import message
+from uasfly.sensor_messages import AccelerometerSample as AccelerometerSample
+from uasfly.sensor_messages import AttitudeTargetSample as AttitudeTargetSample
+from uasfly.sensor_messages import BatterySample as BatterySample
+from uasfly.sensor_messages import MarkerSample as MarkerSample
+from uasfly.sensor_messages import OdometrySample as OdometrySample
 from uasfly.wind_messages import WindEstimate
 
 
@@ -27,63 +33,6 @@ class FlightMode(enum.Enum):
     POSITION = "position"
     DESCEND = "descend"
     OTHER = "other"
-
-
-@message
-class OdometrySample:
-    """PX4's own estimate of its motion (ODOMETRY); the position is GNSS-like: it may carry a slow bias.
-
-    Attributes:
-        time_s: when it was true.
-        position_in_world: (3,) m, ENU from PX4's local origin.
-        velocity_in_world: (3,) m/s.
-        quaternion_body_to_world: (4,) unit quaternion.
-        angular_rate_in_body: (3,) rad/s.
-        reset_counter: grows by one when PX4's estimator jumps.
-    """
-
-    time_s: float
-    position_in_world: Array
-    velocity_in_world: Array
-    quaternion_body_to_world: Array
-    angular_rate_in_body: Array
-    reset_counter: int = 0
-
-
-@message
-class MarkerSample:
-    """Pose of a marker (or bundle) relative to the body, from a camera frame exposed at `time_s`.
-
-    Attributes:
-        marker_id: which marker or bundle.
-        position_in_body: (3,) m, marker origin seen from the body origin.
-        quaternion_marker_to_body: (4,).
-        covariance: (6, 6) of position [m^2, body axes] and rotation [rad^2, marker axes: true = measured * exp(error)].
-    """
-
-    time_s: float
-    marker_id: int
-    position_in_body: Array
-    quaternion_marker_to_body: Array
-    covariance: Array
-
-
-@message
-class AttitudeTargetSample:
-    """What PX4's attitude controller is being asked for (ATTITUDE_TARGET), by whichever mode flies; thrust 0..1."""
-
-    time_s: float
-    quaternion_body_to_world: Array
-    thrust: float
-
-
-@message
-class BatterySample:
-    """Battery as PX4 reports it; `remaining` is 0..1, NaN where unknown."""
-
-    time_s: float
-    voltage_v: float
-    remaining: float
 
 
 @message
@@ -213,6 +162,7 @@ class RequestResult:
 
 Sample = (
     OdometrySample
+    | AccelerometerSample
     | MarkerSample
     | AttitudeTargetSample
     | BatterySample

@@ -17,6 +17,7 @@ from uasfly.flight.pilot import Pilot
 from uasfly.flight.sequencer import Engage
 from uasfly.link.encode import check_setpoint
 from uasfly.messages import (
+    AccelerometerSample,
     AttitudeTargetSample,
     BatterySample,
     FlightMode,
@@ -91,6 +92,7 @@ class PilotSession:
         return [
             *(OdometrySample(now - age, UP, zero, LEVEL, zero) for age in (0.012, 0.002)),
             VehicleSample(now, mode, True, True),
+            AccelerometerSample(now - 0.01, np.array((0.0, 0.0, 9.8))),
             AttitudeTargetSample(now, LEVEL, 0.35),
             HealthSample(now, True, True, True, 3, 12, 0.3),
             BatterySample(now, 15.8, 0.9),
@@ -128,7 +130,7 @@ def _odd_sample(rng: Rng, now_s: float) -> Sample:
         made = rng.normal(size=4)
         return made / np.linalg.norm(made) if rng.random() < 0.7 else vector(4)
 
-    kind = rng.integers(9)
+    kind = rng.integers(10)
     if kind < 3:
         good = OdometrySample(time_s, UP, np.zeros(3), LEVEL, np.zeros(3), int(rng.integers(3)))
         part = rng.integers(6)
@@ -155,7 +157,8 @@ def _odd_sample(rng: Rng, now_s: float) -> Sample:
         return HealthSample(time_s, *flags, int(rng.integers(256)), int(rng.integers(256)), number())
     if kind == 7:
         return TextSample(time_s, int(rng.integers(-3, 300)), choice(rng, ("", "x", "\x1b[2J", "é" * 300)))
-    if rng.random() < 0.05:
-        return LinkSample(time_s, LinkEvent.REBOOTED)
+    if kind == 8:
+        return AccelerometerSample(time_s, vector())
     request = Request(choice(rng, list(RequestKind)), number())
-    return RequestResult(time_s, request, bool(rng.integers(2)), "odd")
+    rebooted = LinkSample(time_s, LinkEvent.REBOOTED)
+    return rebooted if rng.random() < 0.05 else RequestResult(time_s, request, bool(rng.integers(2)), "odd")

@@ -11,6 +11,7 @@ import pytest
 from uasfly.frames import quaternion_from_euler
 from uasfly.link.in_process import ANSWER_LATENCY_S, InProcessLink
 from uasfly.messages import (
+    AccelerometerSample,
     Array,
     AttitudeTargetSample,
     BatterySample,
@@ -83,6 +84,10 @@ class ClockworkVehicle:
         """Level."""
         return AttitudeTargetSample(self.time_s, LEVEL, 0.3)
 
+    def accelerometer(self) -> AccelerometerSample:
+        """Carries its time."""
+        return AccelerometerSample(self.time_s, np.array((self.time_s, 0.0, 9.8)))
+
     def battery(self) -> BatterySample:
         """Full."""
         return BatterySample(self.time_s, 16.8, 1.0)
@@ -126,12 +131,13 @@ def _fly(link: InProcessLink, seconds: float, period_s: float = 0.02) -> list[tu
 
 
 def test_streams_come_at_the_rates_that_px4_is_asked_for() -> None:
-    """Odometry 100 Hz, attitude target 50 Hz, state 2 Hz, battery 1 Hz, health 5 Hz."""
+    """Odometry 100 Hz, attitude target and accelerometer 50 Hz, state 2 Hz, battery 1 Hz, health 5 Hz."""
     kinds = [type(sample) for _, sample in _fly(_link(ClockworkVehicle()), 10.0)]
     counts = {kind: kinds.count(kind) for kind in set(kinds)}
     assert counts == {
         OdometrySample: 1000,
         AttitudeTargetSample: 500,
+        AccelerometerSample: 500,
         VehicleSample: 20,
         BatterySample: 10,
         HealthSample: 50,

@@ -17,6 +17,7 @@ import pytest
 from tests.winds import wind_estimate
 from uasfly.errors import FileError
 from uasfly.messages import (
+    AccelerometerSample,
     FactsSample,
     FlightMode,
     NamedValue,
@@ -63,6 +64,7 @@ def _equal(a: object, b: object) -> bool:
     "message",
     [
         _odometry(0.1),
+        AccelerometerSample(0.2, RNG.normal(size=3)),
         _status(),
         VehicleSample(1.0, FlightMode.OFFBOARD, armed=True, in_air=False),
         RequestResult(2.0, Request(RequestKind.TAKEOFF, 1.5), accepted=False, text="preflight"),

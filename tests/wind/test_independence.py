@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-MESSAGES = {"uasfly.message_class", "uasfly.messages", "uasfly.wind_messages"}
+MESSAGES = {"uasfly.message_class", "uasfly.messages", "uasfly.sensor_messages", "uasfly.wind_messages"}
 BELOW = {"uasfly", "uasfly.airframe", "uasfly.errors", "uasfly.frames", *MESSAGES}
 
 

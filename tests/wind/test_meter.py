@@ -11,9 +11,11 @@ import pytest
 from tests.wind.steady_air import estimates
 from uasfly.airframe import GRAVITY_M_S2, Airframe
 from uasfly.files import find_file, load_file
-from uasfly.messages import OdometrySample, StateEstimate
+from uasfly.frames import rotation_matrix
+from uasfly.messages import AccelerometerSample, OdometrySample, StateEstimate
 from uasfly.wind.drag_curve import DragCurve
 from uasfly.wind.meter import INTERVAL_S, WindMeter
+from uasfly.wind.thrust_free import slopes
 from uasfly.wind_messages import WindEstimate
 
 AIRFRAME = load_file(find_file("airframe", "f550"), Airframe)
@@ -158,3 +160,38 @@ def test_the_margin_is_what_the_wind_leaves_of_tilt_and_thrust() -> None:
     weak = measured.step(later.time_s, later, True, 16.0)
     assert weak is not None
     assert weak.holdable_m_s < limit.holdable_m_s
+
+
+def felt_by(of: StateEstimate, pushed: tuple[float, float]) -> AccelerometerSample:
+    """What the accelerometer reads where the air pushes so, horizontally, as at the end of `told`'s cycles."""
+    force = rotation_matrix(of.quaternion_body_to_world).T @ (*pushed, 0.0)
+    return AccelerometerSample(of.time_s - 0.005, np.array((force[0], force[1], 9.8)))
+
+
+@pytest.mark.parametrize("wrong", [None, math.nan, 3.0])
+def test_with_an_accelerometer_the_wind_is_told_as_it_is_just_now(wrong: float | None) -> None:
+    """The same wind, 50 ms old instead of 300; where it says nothing, garbage or the contrary, as without it."""
+    wind, measured = wind_towards(7.0, 60.0), meter()
+    before = meter()
+    last, without = None, None
+    for k, estimate in enumerate(estimates(CURVE, wind, 8.0)):
+        slope_x, slope_y = (float(v) for v in slopes(estimate.quaternion_body_to_world[None])[0])
+        pushed = (-GRAVITY_M_S2 * slope_x, -GRAVITY_M_S2 * slope_y)
+        for one in (measured, before):
+            one.add(sample(estimate))
+        if wrong is None or k < 200:
+            measured.add(felt_by(estimate, pushed))
+        else:
+            measured.add(AccelerometerSample(estimate.time_s - 0.005, np.array((wrong, 0.0, 9.8))))
+        last = measured.step(estimate.time_s, estimate, True, K_THRUST)
+        without = before.step(estimate.time_s, estimate, True, K_THRUST)
+    assert last is not None
+    assert without is not None
+    np.testing.assert_allclose(last.velocity_in_world, wind, atol=0.02)
+    age_s = 107.98 - last.time_s
+    if wrong is None:
+        assert age_s < 0.25  # of which 0.2 s until it is renewed
+        assert age_s < 107.98 - without.time_s - 0.2
+    else:
+        assert last.time_s == without.time_s
+        assert last.velocity_in_world.tolist() == without.velocity_in_world.tolist()

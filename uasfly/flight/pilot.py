@@ -29,7 +29,6 @@ from uasfly.messages import (
     Alarm,
     Array,
     Authority,
-    OdometrySample,
     Phase,
     ReferenceHorizon,
     Request,
@@ -109,7 +108,8 @@ class Pilot:
         self._meter = AuthorityMeter(airframe.limits, airframe.model, mission.transition.speed_m_s)
         self._authority: Authority | None = None  # at the monitors' last look
         wind = wind_settings(airframe)
-        self._wind_meter = None if wind is None else WindMeter(wind, airframe.limits)
+        feels = airframe.observer.accelerometer_sigma_m_s2 is not None
+        self._wind_meter = None if wind is None else WindMeter(wind, airframe.limits, feels)
         self._wind: WindEstimate | None = None
         self._response = Response()
         self._thrust = TrimmedThrust(observer, controller)
@@ -155,7 +155,7 @@ class Pilot:
         meter = self._wind_meter
         for sample in samples:
             self.observer.add(sample)
-            if meter is not None and isinstance(sample, OdometrySample):
+            if meter is not None:
                 meter.add(sample)
         text = self._thrust.step(time_s, self._estimate, self.view.in_air)
         if text:

@@ -9,13 +9,15 @@ from typing import Any
 from pydantic_core import from_json  # five times as fast as json.loads
 
 from uasfly.link.clock import ClockMap
+from uasfly.link.inertial import NAME as INERTIAL
+from uasfly.link.inertial import accelerometer_sample
 from uasfly.link.motion import attitude_target_sample, battery_sample, odometry_sample
 from uasfly.link.texts import TextAssembler
 from uasfly.link.truth import GeographicTruth, simulated_truth
 from uasfly.link.vehicle_state import HealthState, VehicleState
 from uasfly.messages import Sample, TextSample
 
-Handler = Callable[[dict[str, Any], float], Sample | None]
+Handler = Callable[[Any, float], Sample | None]  # fields of a message (INERTIAL: or of several), arrival
 
 # What decoding a message may raise whose fields are missing, of another type or out of all bounds.
 MALFORMED = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
@@ -46,6 +48,7 @@ class Decoder:
         self._handlers: dict[str, Handler] = {
             "ODOMETRY": self._odometry,
             "ATTITUDE_TARGET": self._attitude_target,
+            INERTIAL: self._inertial,
             "HEARTBEAT": self.state.heartbeat,
             "CURRENT_MODE": lambda fields, _: self.state.current_mode(fields),
             "EXTENDED_SYS_STATE": lambda fields, _: self.state.landed_state(fields),
@@ -68,7 +71,7 @@ class Decoder:
 
         Args:
             name: of the message, one of `names`.
-            text: its fields as JSON.
+            text: its fields as JSON; of INERTIAL also a list of several (see `inertial.taken`).
             arrival_s: host time of its arrival.
 
         Returns:
@@ -96,6 +99,13 @@ class Decoder:
     def _attitude_target(self, fields: dict[str, Any], arrival_s: float) -> Sample | None:
         time_s = self._clock.to_host(fields["time_boot_ms"] * MILLI, arrival_s)
         return self._counted("ATTITUDE_TARGET", attitude_target_sample(fields, time_s))
+
+    def _inertial(self, fields: dict[str, Any] | list[dict[str, Any]], arrival_s: float) -> Sample | None:
+        readings = fields if isinstance(fields, list) else [fields]
+        sample, unusable = accelerometer_sample(readings, self._clock, arrival_s)
+        if unusable:
+            self.dropped[INERTIAL] += unusable
+        return sample
 
     def _battery(self, fields: dict[str, Any], arrival_s: float) -> Sample | None:
         self._battery_id = min(self._battery_id, fields["id"])  # of several batteries the first counts

@@ -19,6 +19,7 @@ import numpy as np
 from uasfly.frames import quaternion_from_euler
 from uasfly.link.encode import check_setpoint
 from uasfly.messages import (
+    AccelerometerSample,
     Array,
     AttitudeTargetSample,
     BatterySample,
@@ -40,6 +41,7 @@ from uasfly.wind_messages import WindEstimate
 
 ODOMETRY_RATE_HZ = 100.0
 ATTITUDE_TARGET_RATE_HZ = 50.0
+ACCELEROMETER_RATE_HZ = 50.0  # the MAVSDK end takes the mean of the readings of a control cycle
 STATE_RATE_HZ = 2.0
 BATTERY_RATE_HZ = 1.0
 HEALTH_RATE_HZ = 5.0
@@ -129,6 +131,10 @@ class DirectVehicle(Protocol):
         """What the attitude controller is asked for, now."""
         ...
 
+    def accelerometer(self) -> AccelerometerSample | None:
+        """Mean of the accelerometer's last readings, now; None where it says nothing."""
+        ...
+
     def battery(self) -> BatterySample:
         """Battery, now."""
         ...
@@ -176,6 +182,7 @@ class InProcessLink:
         self._ticks = [
             _Tick(1.0 / ODOMETRY_RATE_HZ, vehicle.odometry),
             _Tick(1.0 / ATTITUDE_TARGET_RATE_HZ, vehicle.attitude_target),
+            _Tick(1.0 / ACCELEROMETER_RATE_HZ, vehicle.accelerometer),
             _Tick(1.0 / STATE_RATE_HZ, self._state),
             _Tick(1.0 / BATTERY_RATE_HZ, vehicle.battery),
             _Tick(1.0 / HEALTH_RATE_HZ, vehicle.health),
@@ -192,7 +199,9 @@ class InProcessLink:
             if self._commands and self._commands[0][0] <= next_tick.due_s:
                 self._deliver(heapq.heappop(self._commands)[2])
             else:
-                self._arrive(next_tick.read())
+                sample = next_tick.read()
+                if sample is not None:
+                    self._arrive(sample)
                 next_tick.go_on()
             self._tell_changes()
             for text in self._vehicle.take_texts():
@@ -306,7 +315,7 @@ class _Tick:
 
 
 class _Reader(Protocol):
-    def __call__(self) -> Sample: ...
+    def __call__(self) -> Sample | None: ...
 
 
 _due = attrgetter("due_s")

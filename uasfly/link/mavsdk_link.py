@@ -23,6 +23,7 @@ from uasfly.link.decoder import MALFORMED, Decoder
 from uasfly.link.encode import attitude_target, check_setpoint, status_texts, wind_covariance
 from uasfly.link.events import EchoFilter, EventFeed
 from uasfly.link.finding import find_vehicle, refuse_several
+from uasfly.link.inertial import taken
 from uasfly.link.modes import CMD_REQUEST_MESSAGE
 from uasfly.link.parameters import ParameterChannel
 from uasfly.link.requests import RequestDesk
@@ -40,7 +41,8 @@ HOME_POSITION_ID = 242
 HOME_PATIENCE_S = 0.5
 
 EVENTS_MIN_BAUD = 230400  # the texts of PX4's events are some 100 kB to fetch, once
-KEPT = {"STATUSTEXT": 64, "ODOMETRY": 16, "ATTITUDE_TARGET": 16, "DEBUG_FLOAT_ARRAY": 16, "HIL_STATE_QUATERNION": 16}
+KEPT = {"STATUSTEXT": 64, "HIGHRES_IMU": 32, "ODOMETRY": 16, "ATTITUDE_TARGET": 16, "DEBUG_FLOAT_ARRAY": 16}
+KEPT |= {"HIL_STATE_QUATERNION": 16}
 KEPT_OTHERWISE = 4
 TRUTH_MESSAGES = frozenset({"DEBUG_FLOAT_ARRAY", "HIL_STATE_QUATERNION", "GPS_GLOBAL_ORIGIN"})
 
@@ -143,7 +145,7 @@ class MavsdkLink:
         self._serve()
         now_s = time.monotonic()
         filled = [slot for slot in self._sample_slots.values() if slot.waiting]
-        waiting = [(arrival, slot.name, text) for slot in filled for arrival, text in slot.take()]
+        waiting = [(arrival, slot.name, text) for slot in filled for arrival, text in taken(slot)]
         waiting.sort(key=_arrival)
         texts = [(text, "event") for text in self._events.take()]
         samples: list[Sample] = []

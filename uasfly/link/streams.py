@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from uasfly.link.commands import CommandChannel, Ending
+from uasfly.link.inertial import NAME as INERTIAL
 from uasfly.link.modes import CMD_REQUEST_MESSAGE, CMD_SET_MESSAGE_INTERVAL
 
 GPS_GLOBAL_ORIGIN_ID = 49
@@ -22,6 +23,7 @@ class Stream:
 STREAMS = (
     Stream("ODOMETRY", 331, 100.0),
     Stream("ATTITUDE_TARGET", 83, 50.0),
+    Stream(INERTIAL, 105, 200.0),  # all that PX4 has
     Stream("CURRENT_MODE", 436, 50.0),  # PX4 sends it on a change and twice a second; HEARTBEAT stays at 1 Hz
     Stream("EXTENDED_SYS_STATE", 245, 10.0),
     Stream("ESTIMATOR_STATUS", 230, 5.0),
@@ -33,14 +35,21 @@ TRUTH_STREAMS = (
 )
 
 
-async def ask_for_streams(commands: CommandChannel, want_truth: bool) -> list[str]:
+async def ask_for_streams(commands: CommandChannel, want_truth: bool, narrow: bool = False) -> list[str]:
     """Set the message intervals, one after the other.
+
+    Args:
+        commands: to the vehicle.
+        want_truth: also ask for the true state.
+        narrow: the line is a serial one: the inertial unit keeps PX4's own rate (50 Hz), its readings would crowd it.
 
     Returns:
         Texts about what the vehicle does not send as asked; truth is not among them, no real vehicle has it.
     """
     problems = []
     for stream in STREAMS:
+        if narrow and stream.name == INERTIAL:
+            continue
         outcome = await commands.command(CMD_SET_MESSAGE_INTERVAL, (float(stream.message_id), 1e6 / stream.rate_hz))
         if not outcome.accepted:
             why = "refuses" if outcome.ending is Ending.ANSWERED else "does not answer"

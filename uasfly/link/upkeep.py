@@ -90,7 +90,7 @@ class Upkeep:
         return task
 
     async def _stream(self) -> None:
-        for problem in await ask_for_streams(self._commands, self._want_truth):
+        for problem in await ask_for_streams(self._commands, self._want_truth, narrow=self._device is not None):
             self._say(WARNING, problem)
 
     async def _keep_time(self) -> None:

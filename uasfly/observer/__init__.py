@@ -1,5 +1,6 @@
 """The error-state Kalman filter and its measurements."""
 
-from uasfly.observer.observer import Counters, Observer
+from uasfly.observer.counters import Counters
+from uasfly.observer.observer import Observer
 
 __all__ = ["Counters", "Observer"]

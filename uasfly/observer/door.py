@@ -8,11 +8,12 @@ from operator import mul
 import numpy as np
 
 from uasfly.message_class import message
-from uasfly.messages import Array, MarkerSample, OdometrySample
+from uasfly.messages import AccelerometerSample, Array, MarkerSample, OdometrySample
 
 _LARGEST_SQUARED = 1e14  # of m: beyond it a number is as good as infinite
 _FASTEST_SQUARED = 1e6  # of m/s: no vehicle is as fast
 _TURNS_SQUARED = 40.0**2  # of rad/s: a flight controller's gyro ends at 35, and no gate holds back what is beyond it
+_SHOCKS_SQUARED = 160.0**2  # of m/s^2: PX4's accelerometers end there (16 g)
 _NORM_TOLERANCE = 0.05  # a quaternion further from unit length is no rotation
 
 
@@ -112,3 +113,22 @@ def checked_sighting(sample: MarkerSample) -> Sighting | None:
     except np.linalg.LinAlgError:
         return None
     return Sighting(sample.time_s, sample.marker_id, np.array(position + quaternion), covariance)
+
+
+@message
+class SpecificForce:
+    """A usable AccelerometerSample: `force` (3,) [m/s^2], body; for the filter without the bias."""
+
+    time_s: float
+    force: list[float]
+
+
+def checked_accelerometer(sample: AccelerometerSample) -> SpecificForce | None:
+    """The sample; None where it cannot be used."""
+    force = sample.specific_force_in_body.tolist()
+    if not math.isfinite(sample.time_s) or not plausible(force, _SHOCKS_SQUARED):
+        return None
+    return SpecificForce(sample.time_s, force)
+
+
+Measurement = Odometry | Sighting | SpecificForce

@@ -23,6 +23,9 @@ from uasfly.observer import update as up
 # speed (see `_recovery`), in the order of states.SENSORS: rad/s, m/s, m/s^2.
 JUMP_SIGMAS = 2.0
 RECOVERY_RATES = (1.0, 50.0, 30.0)  # the position's goes into the GNSS bias, which nothing flies by; a gust is fast
+# Normalised innovation squared beyond which a reading of the accelerometer is an error: the edge of a jet is out of the
+# common too, and it is what the accelerometer is there for. Absurd readings do not come this far (see `door`).
+FORCE_GATE = 50.0
 FOLLOW_RATE_M_S = 3.0  # the state's way back to a position that it has lost
 
 
@@ -135,6 +138,33 @@ def odometry_step(markers: int) -> ca.Function:
     return _function(f"odometry_step_{markers}", [packed, inputs], [result, ca.vertcat(*nis, *accepted, *residuals)])
 
 
+@lru_cache(maxsize=8)
+def accelerometer_step(markers: int) -> ca.Function:
+    """(packed state, inputs (ACCELEROMETER_INPUTS)) -> (packed state after prediction and update, outputs).
+
+    The GNSS bias and the velocity's wander stay as they are (see `_held`): the accelerometer says nothing of them.
+    """
+    layout = s.Layout(markers)
+    packed, inputs = ca.SX.sym("packed", layout.size), ca.SX.sym("inputs", s.ACCELEROMETER_INPUTS)
+    nominal, covariance = _predict(*_unpack(packed, layout), inputs)
+    core, model = nominal[: s.CORE_NOMINAL], (inputs[s.IN_THRUST], inputs[s.IN_DRAG])
+    residual = inputs[s.IN_SPECIFIC_FORCE] - me.measure_specific_force(core, *model)
+    jacobian = ca.horzcat(me.specific_force_jacobian(core, *model), ca.SX(3, layout.errors - s.CORE_ERROR))
+    noise = ca.SX(ca.diag(inputs[s.IN_ACCELEROMETER_VARIANCE]))
+    expected = ca.mtimes(ca.mtimes(jacobian, covariance), jacobian.T)
+    nis, _, inverse = up.innovation_test(residual, expected, noise, ca.SX(1.0))
+    passed = nis < FORCE_GATE
+    shortened = ca.sqrt(up.GATE_3 / ca.fmax(nis, up.GATE_3)) * residual
+    sample = up.matched_covariance(noise, noise, inverse, shortened, ca.SX(1.0))
+    held = ca.SX.eye(layout.errors)
+    held[s.D_BIAS, s.D_BIAS] = held[s.D_VELOCITY_WANDER, s.D_VELOCITY_WANDER] = ca.SX(3, 3)
+    gain, covariance = up.joseph_update(covariance, jacobian, noise, passed * ca.sparsify(held))
+    nominal, covariance = _inject(nominal, covariance, ca.mtimes(gain, residual))
+    result = ca.vertcat(nominal, ca.vec(covariance), packed[layout.matched.start :])
+    outputs = ca.vertcat(nis, passed, 0.5 * (sample[0, 0] + sample[1, 1]))
+    return _function(f"accelerometer_step_{markers}", [packed, inputs], [result, outputs])
+
+
 class _Sensor:
     """Symbols of one sensor of the odometry."""
 
@@ -229,6 +259,12 @@ def injection(markers: int) -> ca.Function:
     nominal, error = ca.SX.sym("nominal", layout.nominal_size), ca.SX.sym("error", layout.errors)
     covariance = ca.SX.sym("covariance", layout.errors, layout.errors)
     return _function(f"injection_{markers}", [nominal, covariance, error], [*_inject(nominal, covariance, error)])
+
+
+@lru_cache(maxsize=8)
+def compiled_accelerometer_step(markers: int) -> ca.Function:
+    """`accelerometer_step`, compiled where that can be had."""
+    return native.compiled([accelerometer_step(markers)], f"accelerometer{markers}")[0]
 
 
 @lru_cache(maxsize=8)

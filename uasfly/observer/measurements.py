@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import casadi as ca
 
-from uasfly.model import quaternion_product, rotation_from_quaternion
+from uasfly.airframe import GRAVITY_M_S2
+from uasfly.model import acceleration_in_world, quaternion_product, rotation_from_quaternion
 from uasfly.observer import states as s
 from uasfly.observer.error_state import (
     at_zero,
@@ -39,6 +40,23 @@ def measure_attitude(core: ca.SX) -> ca.SX:
 def attitude_innovation(core: ca.SX, measured: ca.SX) -> ca.SX:
     """Innovation (3,) [rad] of a measured quaternion: the turn that leads to it from the expected one, body axes."""
     return logarithm(quaternion_product(conjugate(measure_attitude(core)), measured))
+
+
+def measure_specific_force(core: ca.SX, thrust: ca.SX, drag: ca.SX) -> ca.SX:
+    """What the accelerometer reads (3,) [m/s^2], body: R' (v' + g) of eq. 1.
+
+    Along x and y that is the air's force alone: the thrust has no part in the plane of the rotors.
+    """
+    rotation = rotation_from_quaternion(core[s.QUATERNION])
+    level = acceleration_in_world(core[s.VELOCITY], ca.SX.zeros(3), ca.SX(0.0), core[s.FORCE], drag)
+    by_air = ca.mtimes(rotation.T, level + ca.DM([0.0, 0.0, GRAVITY_M_S2]))
+    return by_air + ca.vertcat(0, 0, thrust)
+
+
+def specific_force_jacobian(core: ca.SX, thrust: ca.SX, drag: ca.SX) -> ca.SX:
+    """Derivative (3, 21) of `measure_specific_force` with respect to the error."""
+    error = ca.SX.sym("error", s.CORE_ERROR)
+    return at_zero(measure_specific_force(retract(core, error), thrust, drag), error)
 
 
 def odometry_jacobian(core: ca.SX, sensor: int) -> ca.SX:

@@ -10,7 +10,8 @@ import numpy as np
 from uasfly.message_class import message
 from uasfly.messages import Array
 from uasfly.observer import states as s
-from uasfly.observer.door import Odometry, Sighting
+from uasfly.observer.accelerometer import AccelerometerMemory
+from uasfly.observer.door import Measurement, Sighting
 from uasfly.observer.gusts import Gusts
 
 
@@ -30,6 +31,7 @@ class Moment:
         sighted_s: last accepted sighting of each marker.
         measured: what was measured here; None for a mere prediction.
         gusts: how they were up to here.
+        accelerometer: what was learnt of it up to here.
     """
 
     time_s: float
@@ -41,8 +43,9 @@ class Moment:
     rate_s: float
     odometry_s: float
     sighted_s: tuple[float, ...]
-    measured: Odometry | Sighting | None
+    measured: Measurement | None
     gusts: Gusts
+    accelerometer: AccelerometerMemory
 
     @property
     def layout(self) -> s.Layout:

@@ -6,7 +6,6 @@ Kalaitzakis & Vitzilaios 2023, section 2.3, with the measurements put where they
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from uasfly.airframe import Airframe
 from uasfly.frames import rotation_matrix
 from uasfly.marker_prediction import MarkerPrediction
 from uasfly.messages import (
+    AccelerometerSample,
     Array,
     AttitudeTargetSample,
     FlightMode,
@@ -26,10 +26,12 @@ from uasfly.messages import (
     VehicleSample,
 )
 from uasfly.observer import states as s
+from uasfly.observer.accelerometer import BiasWatch
 from uasfly.observer.agreement import Agreement
 from uasfly.observer.contact import LIGHT_M_S2, GroundContact
+from uasfly.observer.counters import Counters
 from uasfly.observer.diagnosis import Diagnosis, Journal
-from uasfly.observer.door import Odometry, Sighting, checked_odometry, checked_sighting
+from uasfly.observer.door import Odometry, Sighting, checked_accelerometer, checked_odometry, checked_sighting
 from uasfly.observer.expected import expected_marker
 from uasfly.observer.glide import Glide
 from uasfly.observer.gnss import DriftWatch, Outage
@@ -42,6 +44,7 @@ OWN_COMMAND_S = 0.5  # for this long after a command of ours in offboard, PX4's 
 SILENT_AFTER_S = 0.15  # without odometry for this long estimates are predicted with their uncertainty,
 TICK_BEHIND_S = 0.1  # and the filter itself to this long before now
 JUMP_AHEAD_S = 1.0  # a sample further ahead of the filter than this needs a second one to be believed
+FELT_WITHIN_S = 0.06  # of where the filter stands: an accelerometer's sample further away says nothing
 LONGEST_GAP_S = 5.0  # a longer gap is not bridged: the filter starts again
 EXPECTED_WITHIN_S = 0.5  # of where the filter stands: beyond it nothing is said about where a marker is to be seen
 GLIDE_AFTER_S, GLIDE_FOR_S = 1.0, 5.0  # without a sighting for so long, what the next ones correct is told gradually
@@ -49,26 +52,6 @@ MOVED_AFTER, MOVED_M = 5, 0.15  # so many sightings refused in a row, that far a
 THRUST_SHOWS_S = 0.05  # in the velocity, over so long: for what carries the vehicle
 FORCE_SHOWS_S = 0.5  # the force is what thrust left over in about so long
 RESTART_AFTER_S = 1.0  # samples that are all too old for this long: the clock was set back, start again
-
-
-@dataclass(slots=True)
-class Counters:
-    """What the observer refused, since it was made.
-
-    Attributes:
-        rejected: measurements outside their gate, by sensor.
-        late: put back in time. dropped: too old for the buffer. duplicates: sensor and time already there.
-        ahead: alone far ahead in time. non_finite: samples or parts of samples with unusable numbers.
-        restarts: times the filter started again after a gap or a clock that was set back.
-    """
-
-    rejected: dict[str, int] = field(default_factory=lambda: dict.fromkeys((*s.SENSORS, s.MARKER_SENSOR), 0))
-    late: int = 0
-    dropped: int = 0
-    duplicates: int = 0
-    ahead: int = 0
-    non_finite: int = 0
-    restarts: int = 0
 
 
 class Observer:
@@ -108,6 +91,8 @@ class Observer:
         self._refused: dict[int, int] = {}
         self.retakes_moved = False
         self._outage = Outage(airframe.observer.velocity_sigma_m_s)
+        self._bias = BiasWatch()
+        self._feels = airframe.observer.accelerometer_sigma_m_s2 is not None
         self._in_air = False
         self._in_air_s = -math.inf
         self._own_command_s = -math.inf
@@ -122,7 +107,10 @@ class Observer:
                 self.counters.non_finite += 1
             if odometry is not None:
                 self._look_for_contact(odometry)
+                self._bias.move(odometry)
                 self._measure(self._outage.usable(odometry) if self._in_air and self._outage.active else odometry)
+        elif isinstance(sample, AccelerometerSample):
+            self._feel(sample)
         elif isinstance(sample, MarkerSample):
             sighting = checked_sighting(sample)
             if sighting is None:
@@ -251,6 +239,11 @@ class Observer:
         return self._timeline.newest if self._timeline else None
 
     @property
+    def accelerometer_bias(self) -> tuple[float, float]:
+        """Bias of the accelerometer as learnt, along the body's x and y [m/s^2]."""
+        return self._bias.x, self._bias.y
+
+    @property
     def covariance(self) -> Array:
         """Covariance (n, n) of the error state (states.D_*, then six a marker) where the filter stands.
 
@@ -319,6 +312,29 @@ class Observer:
             else:
                 self.counters.late += 1
                 self._note(measured, timeline.insert(measured))
+
+    def _feel(self, sample: AccelerometerSample) -> None:
+        """A sample of the accelerometer: used in the air, where the filter stands; it never moves the filter's time."""
+        timeline = self._timeline
+        if timeline is None or not (self._feels and self._flies):
+            return
+        felt = checked_accelerometer(sample)
+        if felt is None:
+            self.counters.non_finite += 1
+            return
+        felt = self._bias.corrected(felt)
+        if felt is None:
+            self.counters.rejected[s.ACCELEROMETER_SENSOR] += 1
+            return
+        behind_s = timeline.newest.time_s - felt.time_s
+        if not abs(behind_s) < FELT_WITHIN_S or felt.time_s < timeline.oldest.time_s:
+            self.counters.dropped += 1
+        elif timeline.holds(felt):
+            self.counters.duplicates += 1
+        else:
+            verdict = (timeline.insert(felt) if behind_s > 0.0 else timeline.append(felt.time_s, felt, True))[0]
+            self.statistics[verdict.sensor] = (verdict.nis, verdict.dof)
+            self.counters.rejected[verdict.sensor] += not verdict.accepted
 
     def _sight(self, timeline: Timeline, sighting: Sighting) -> None:
         """A sighting, mostly late; the first after a while may move the filter, and what is told then glides there."""

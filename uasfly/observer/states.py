@@ -36,6 +36,7 @@ MARKER_ERROR = 6  # position (m, world), rotation (rad, marker frame)
 SENSORS = ("attitude", "position", "velocity")
 ATTITUDE_SENSOR, POSITION_SENSOR, VELOCITY_SENSOR = range(3)
 SENSOR_DOF = 3
+ACCELEROMETER_SENSOR = "accelerometer"
 MARKER_SENSOR = "marker"
 MARKER_DOF = 6
 
@@ -114,6 +115,16 @@ IN_AGREES = 44  # 1 while measured position and velocity tell the same motion, e
 ODOMETRY_INPUTS = 45
 IN_MEASURED = slice(20, 36)  # quaternion, position, velocity, use, correlation
 IN_WEIGHTS = slice(39, 45)  # interval, matching weight, mean weight, bias free, wander free, agrees
+
+# Further input of an accelerometer step.
+IN_SPECIFIC_FORCE = slice(45, 48)  # m/s^2, body, measured, without the bias
+IN_ACCELEROMETER_VARIANCE = slice(48, 51)  # m^2/s^4, each axis
+ACCELEROMETER_INPUTS = 51
+IN_ACCELEROMETER = slice(45, 51)
+
+# Output of an accelerometer step beside the new packed state.
+OUT_FORCE_NIS, OUT_FORCE_ACCEPTED, OUT_FORCE_VARIANCE = range(3)  # the last: what the sample says of the variance
+ACCELEROMETER_OUTPUTS = 3
 
 # Output of an odometry step beside the new packed state.
 OUT_NIS = slice(0, 3)  # normalised innovation squared

@@ -15,11 +15,13 @@ from uasfly.airframe import GRAVITY_M_S2, Airframe
 from uasfly.messages import Array
 from uasfly.observer import functions
 from uasfly.observer import states as s
-from uasfly.observer.door import Odometry, Sighting
+from uasfly.observer.accelerometer import nothing_learnt
+from uasfly.observer.door import Measurement, Odometry, Sighting, SpecificForce
 from uasfly.observer.gusts import AS_CONFIGURED, Gusts
 from uasfly.observer.markers import MarkerAlgebra
 from uasfly.observer.moment import Moment, Verdict
 from uasfly.observer.thrust import ThrustHistory
+from uasfly.observer.update import SIGMA_FACTOR_MIN
 
 MAX_STEP_S = 0.04  # longest single prediction; thrust is averaged over it
 RATE_VALID_S = 0.15  # after this long without telemetry the turn of the vehicle is unknown
@@ -31,6 +33,8 @@ INITIAL_FORCE_SIGMA = 1.0  # m/s^2, before anything is known of the wind (P0 of 
 MARKER_FRESH_S = 20.0
 MEAN_TIME_S = 0.25  # time constant of the mean innovation that tells a jump from noise
 RUNAWAY_DENSITY = 0.5  # m/sqrt(s), walk of the GNSS bias while GNSS runs away
+VERTICAL_VARIANCE = 1e6  # m^2/s^4: along the thrust the accelerometer is not used
+GREATEST_VARIANCE = 1e4  # m^2/s^4, of the accelerometer: as good as not used
 _NO_RATE = (0.0, 0.0, 0.0)
 _GROUND_NOISE = (0.0,) * 3 + (GROUND_ACCELERATION_DENSITY**2,) * 3
 SHORTEST_INTERVAL_S = 1e-3  # between samples
@@ -58,7 +62,7 @@ class Stepper:
             noise.position_correlation_s,
             noise.velocity_correlation_s,
         )
-        self._inputs = np.zeros(s.ODOMETRY_INPUTS)
+        self._inputs = np.zeros(s.ACCELEROMETER_INPUTS)
         self._inputs[s.IN_DRAG] = airframe.model.drag_1_s
         self._inputs[s.IN_WANDER_RATE] = 1.0 / noise.wander_time_s
         self._inputs[s.IN_VELOCITY_WANDER_DENSITY] = 2.0 * noise.velocity_wander_m_s**2 / noise.wander_time_s
@@ -69,6 +73,9 @@ class Stepper:
             noise.velocity_sigma_m_s**2,
         )
         self._outputs = np.empty(s.ODOMETRY_OUTPUTS)
+        self._least_variance = (SIGMA_FACTOR_MIN * (noise.accelerometer_sigma_m_s2 or 0.0)) ** 2
+        self._force_outputs = np.empty(s.ACCELEROMETER_OUTPUTS)
+        self._accelerometer_steps: dict[int, functions.Caller] = {}
         self._predictions: dict[int, functions.Caller] = {}
         self._odometry_steps: dict[int, functions.Caller] = {}
         self._extrapolation = functions.Caller(functions.compiled_extrapolation())
@@ -87,6 +94,9 @@ class Stepper:
             predict, update = generated if in_flight else functions.compiled_steps(markers)
             self._predictions[markers] = functions.Caller(predict)
             self._odometry_steps[markers] = functions.Caller(update)
+            if self._noise.accelerometer_sigma_m_s2 is not None:
+                step = functions.accelerometer_step if in_flight else functions.compiled_accelerometer_step
+                self._accelerometer_steps[markers] = functions.Caller(step(markers))
 
     def start(self, odometry: Odometry, airborne: bool) -> Moment:
         """The first moment, from a complete odometry sample: force, GNSS bias and wanders zero.
@@ -118,16 +128,19 @@ class Stepper:
         packed[layout.covariance] = P.ravel()
         packed[layout.matched] = np.concatenate([np.eye(3).ravel() * variance for variance in variances])
         rate, time_s = tuple(odometry.rate or (0.0, 0.0, 0.0)), odometry.time_s
-        return Moment(time_s, packed, (), (), airborne, rate, time_s, time_s, (), odometry, AS_CONFIGURED)
+        memory = nothing_learnt(self._noise.accelerometer_sigma_m_s2 or 0.0)
+        return Moment(time_s, packed, (), (), airborne, rate, time_s, time_s, (), odometry, AS_CONFIGURED, memory)
 
     def advance(
-        self, before: Moment, time_s: float, measured: Odometry | Sighting | None, airborne: bool
+        self, before: Moment, time_s: float, measured: Measurement | None, airborne: bool
     ) -> tuple[Moment, tuple[Verdict, ...]]:
         """The moment at `time_s` >= `before.time_s`, with what the gates said of the measurement there."""
         if airborne != before.airborne:
             before = replace(before, packed=_without_force(before), airborne=airborne, gusts=AS_CONFIGURED)
         if isinstance(measured, Odometry):
             return self._odometry(before, measured)
+        if isinstance(measured, SpecificForce):
+            return self._specific_force(before, measured)
         moved = replace(before, time_s=time_s, packed=self._predicted(before, time_s, before.rate), measured=measured)
         return self._sighting(moved, measured) if measured else (moved, ())
 
@@ -220,8 +233,38 @@ class Stepper:
             before.sighted_s,
             odometry,
             self._gusts(before, time_s, result, odometry),
+            before.accelerometer,
         )
         return moment, verdicts
+
+    def _specific_force(self, before: Moment, measured: SpecificForce) -> tuple[Moment, tuple[Verdict, ...]]:
+        time_s, inputs, memory = measured.time_s, self._inputs, before.accelerometer
+        steps = max(1, math.ceil((time_s - before.time_s) / MAX_STEP_S))
+        last_s = time_s - (time_s - before.time_s) / steps
+        packed = self._predicted(before, last_s, before.rate) if steps > 1 else before.packed
+        self._prepare_prediction(before, last_s, time_s, before.rate)
+        variance = min(max(memory.variance, self._least_variance), GREATEST_VARIANCE)
+        inputs[s.IN_ACCELEROMETER] = (*measured.force, variance, variance, VERTICAL_VARIANCE)
+        result = np.empty(packed.size)
+        self._accelerometer_steps[len(before.markers)]((packed, inputs), (result, self._force_outputs))
+        nis, accepted, sample = self._force_outputs.tolist()
+        memory = memory.after(time_s, sample, self._window_s)
+        verdict = Verdict(s.ACCELEROMETER_SENSOR, nis, s.SENSOR_DOF, accepted > 0.5)
+        moment = Moment(  # `replace` would take four times as long
+            time_s,
+            result,
+            before.markers,
+            before.scales,
+            before.airborne,
+            before.rate,
+            before.rate_s,
+            before.odometry_s,
+            before.sighted_s,
+            measured,
+            before.gusts,
+            memory,
+        )
+        return moment, (verdict,)
 
     def _gusts(self, before: Moment, time_s: float, packed: Array, odometry: Odometry) -> Gusts:
         """What is known of the gusts after a step; a velocity that model and position deny says nothing of them."""

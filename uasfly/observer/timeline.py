@@ -6,7 +6,7 @@ from bisect import bisect_right
 
 from uasfly.messages import Array
 from uasfly.observer import states as s
-from uasfly.observer.door import Odometry, Sighting
+from uasfly.observer.door import Measurement, Sighting
 from uasfly.observer.moment import Moment, Verdict
 from uasfly.observer.step import Stepper
 
@@ -40,7 +40,7 @@ class Timeline:
         """The last moment not after `time_s`; the oldest where all are."""
         return self._moments[max(self._index_at(time_s), 0)]
 
-    def holds(self, measured: Odometry | Sighting) -> bool:
+    def holds(self, measured: Measurement) -> bool:
         """Whether there is already a measurement of the same sensor (the same marker) at the same time."""
         index = self._index_at(measured.time_s + _SAME_TIME_S)
         while index >= 0 and measured.time_s - self._moments[index].time_s <= _SAME_TIME_S:
@@ -49,7 +49,7 @@ class Timeline:
             index -= 1
         return False
 
-    def append(self, time_s: float, measured: Odometry | Sighting | None, airborne: bool) -> tuple[Verdict, ...]:
+    def append(self, time_s: float, measured: Measurement | None, airborne: bool) -> tuple[Verdict, ...]:
         """Go on to `time_s`, not before the newest moment, and forget what is older than BUFFER_S."""
         moment, verdicts = self._stepper.advance(self.newest, time_s, measured, airborne)
         self._moments.append(moment)
@@ -57,7 +57,7 @@ class Timeline:
             del self._moments[0]
         return verdicts
 
-    def insert(self, measured: Odometry | Sighting) -> tuple[Verdict, ...]:
+    def insert(self, measured: Measurement) -> tuple[Verdict, ...]:
         """Put a measurement in between, not before the oldest moment, and run the filter again from there.
 
         The cost is bounded by the measurements of BUFFER_S.
@@ -90,7 +90,7 @@ class Timeline:
         return bisect_right(self._moments, time_s, key=lambda moment: moment.time_s) - 1
 
 
-def _same_source(one: Odometry | Sighting | None, other: Odometry | Sighting) -> bool:
+def _same_source(one: Measurement | None, other: Measurement) -> bool:
     if isinstance(one, Sighting) and isinstance(other, Sighting):
         return one.marker_id == other.marker_id
-    return isinstance(one, Odometry) and isinstance(other, Odometry)
+    return type(one) is type(other)

@@ -12,11 +12,13 @@ import numpy as np
 
 from uasfly.errors import UasflyError
 from uasfly.frames import quaternion_from_rotation_vector, quaternion_product
-from uasfly.messages import FlightMode, OdometrySample
+from uasfly.messages import AccelerometerSample, FlightMode, OdometrySample
 from uasfly.sim import faults as f
 from uasfly.sim.link_faults import LinkFaults
 
 Vector = tuple[float, float, float]
+
+_HUGE_M_S2 = 1e30
 
 
 class FaultyVehicle(Protocol):
@@ -57,6 +59,7 @@ class FaultBoard:
         self._offset = [0.0, 0.0, 0.0]
         self._drifts: list[f.GnssDrift] = []
         self._gusts: list[tuple[f.Wind, float, float]] = []  # with begin and end
+        self._accelerometer: list[f.Accelerometer] = []
         self._distortions: list[f.VelocitySpike | f.AttitudeSpike | f.OdometryNan] = []
         self._refuses = [0, 0]
         self._now_s = 0.0
@@ -130,6 +133,9 @@ class FaultBoard:
             case f.Wind():
                 end_s = math.inf if fault.duration_s is None else self._now_s + fault.duration_s
                 self._gusts.append((fault, self._now_s, end_s))
+            case f.Accelerometer():
+                self._accelerometer.append(fault)
+                return partial(self._accelerometer.remove, fault)
             case f.RefuseArming() | f.RefuseOffboard():
                 index = int(isinstance(fault, f.RefuseOffboard))
                 self._refuse(index, 1)
@@ -161,6 +167,15 @@ class FaultBoard:
         return replace(
             sample, position_in_world=position, velocity_in_world=velocity, quaternion_body_to_world=quaternion
         )
+
+    def accelerometer(self, sample: AccelerometerSample) -> AccelerometerSample | None:
+        """What the telemetry gives of a sample of the accelerometer, if anything."""
+        if not self._accelerometer:
+            return sample
+        said = self._accelerometer[-1].says
+        if said == "nothing":
+            return None
+        return AccelerometerSample(sample.time_s, np.full(3, math.nan if said == "nan" else _HUGE_M_S2))
 
     def _shift(self, step: tuple[float, ...]) -> None:
         self._offset = [old + s for old, s in zip(self._offset, step, strict=True)]

@@ -81,6 +81,13 @@ class OdometryNan(Lasting):
     duration_s: Annotated[Positive | None, Field(description="to the end when null")] = 1.0
 
 
+class Accelerometer(Lasting):
+    """The inertial unit says nothing, or its accelerometer's numbers are not finite, or absurdly large."""
+
+    kind: Literal["accelerometer"]
+    says: Literal["nothing", "nan", "huge"]
+
+
 class BatteryCharge(FaultBase):
     """The battery has so much charge left."""
 
@@ -201,6 +208,7 @@ Fault = Annotated[
     | VelocitySpike
     | AttitudeSpike
     | OdometryNan
+    | Accelerometer
     | BatteryCharge
     | Motor
     | Wind

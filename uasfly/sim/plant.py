@@ -192,6 +192,12 @@ class Plant(FileModel):
         return self
 
     @property
+    def hover_speed_rad_s(self) -> float:
+        """Speed of the rotors that carries the weight in still air [rad/s]."""
+        thrust_n = self.mass_kg * 9.80665 / self.rotors.count
+        return float((thrust_n / self.rotors.thrust_coefficient) ** (1.0 / self.rotors.speed_exponent))
+
+    @property
     def motor_speed_constant(self) -> float | None:
         """K [rad/s/V] such that full command at the reference voltage gives the full speed; None: there is no such K.
 

@@ -1,7 +1,10 @@
 """Scenario files: the wind, the sensors, the link and the faults that a simulated flight meets.
 
 PX4-like noise comes from PX4's own simulator (SIH quad, main of August 2026): its estimate against ground truth over
-90 s of excitation. Beside small white noise every quantity wanders slowly (1/e correlation 2-6 s): velocity by
+90 s of excitation; the accelerometer's noise too. Its vibration comes from real flights: in a single integral of 5 ms
+0.4 to 0.9 m/s^2 on two light quadrotors, 1.1 to 3.5 on two octorotors and a racing quadrotor, at 40 to 110 Hz, so that
+the mean of four consecutive ones holds about a quarter of it. The bias is what PX4's estimator there is unsure of.
+Beside small white noise every quantity wanders slowly (1/e correlation 2-6 s): velocity by
 0.011-0.032 m/s, roll and pitch by 0.0014-0.0024 rad, yaw by 0.0051 rad; the angular rate is white with 0.006 rad/s;
 delay is compensated to within about 8 ms, on one axis 12 ms.
 """
@@ -75,6 +78,13 @@ class Sensors(FileModel):
     attitude_wander_rad: Annotated[NonNegative, Field(description="on roll, pitch and yaw")] = 0.002
     angular_rate_noise_rad_s: NonNegative = 0.006
     wander_time_s: Positive = 4.0
+    accelerometer_noise_m_s2: Annotated[NonNegative, Field(description="white, in each reading, on each axis")] = 0.07
+    accelerometer_bias_m_s2: Annotated[
+        NonNegative, Field(description="sigma of the bias that PX4's estimator leaves, for the whole flight")
+    ] = 0.03
+    vibration_m_s2: Annotated[
+        NonNegative, Field(description="shaking by the rotors in hover, sigma in a single reading, on each axis")
+    ] = 0.5
     delays: Delays = Delays()
 
     @model_validator(mode="after")

@@ -1,7 +1,7 @@
 """Raw sensors of the simulated vehicle: inertial unit, magnetometer, barometer, GNSS receiver; world ENU, body FLU.
 
-White noise as PX4's simulator adds it, and biases that stay for the flight. Nothing in the vehicle flies by these; they
-are what a ground station looks at.
+White noise as PX4's simulator adds it, biases that stay for the flight, the rotors' vibration as flight logs have it.
+Nothing in the vehicle flies by these; a ground station looks at them, and uasfly may use the accelerometer.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from uasfly.frames import rotation_matrix
-from uasfly.messages import Array
+from uasfly.messages import AccelerometerSample, Array
 from uasfly.sim.body import GRAVITY_M_S2
 from uasfly.sim.estimate import Estimate
 from uasfly.sim.noise_rows import NoiseRows
+from uasfly.sim.scenario import Sensors
 
 HOME_LATITUDE_DEG = 47.397742  # where PX4's simulator starts
 HOME_LONGITUDE_DEG = 8.545594
@@ -24,8 +25,6 @@ HOME_ALTITUDE_M = 489.4
 _EARTH_RADIUS_M = 6371000.0
 _MAGNETIC_FIELD_GAUSS = (0.012, 0.213, -0.428)  # east, north, up as the recorded vehicle measured it there
 
-_ACCELEROMETER_NOISE_M_S2 = 0.1
-_ACCELEROMETER_BIAS_M_S2 = 0.05
 _GYRO_NOISE_RAD_S = 0.01
 _GYRO_BIAS_RAD_S = 0.003
 _MAGNETOMETER_NOISE_GAUSS = 0.02
@@ -34,7 +33,9 @@ _BAROMETER_BIAS_M = 0.3
 _GNSS_NOISE_M = 0.2
 _GNSS_HEIGHT_NOISE_M = 0.5
 _GNSS_VELOCITY_NOISE_M_S = 0.06
-_WIDTH = 16
+_SHAKING = slice(16, 19)
+_WIDTH = 19
+_READINGS = 4  # in one sample of the accelerometer, as the link takes their mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,18 +91,29 @@ class RawSensors:
         rng: source of their noise and biases.
         plant_state, acceleration: the plant's memory (see `dynamics.PlantDynamics`).
         estimate: has GNSS or not, and its slow errors.
+        settings: noise, bias and vibration of the accelerometer.
+        hover_speed_rad_s: of a rotor; the vibration grows with the square of the speed, as imbalance does.
     """
 
     def __init__(
-        self, rng: np.random.Generator, plant_state: array[float], acceleration: array[float], estimate: Estimate
+        self,
+        rng: np.random.Generator,
+        plant_state: array[float],
+        acceleration: array[float],
+        estimate: Estimate,
+        settings: Sensors,
+        hover_speed_rad_s: float,
     ) -> None:
+        self._settings = settings
+        self._hover_speed_rad_s = hover_speed_rad_s
         self._state = plant_state
         self._acceleration = acceleration
         self._estimate = estimate
-        self._acceleration_bias = _ACCELEROMETER_BIAS_M_S2 * rng.standard_normal(3)
+        self._acceleration_bias = settings.accelerometer_bias_m_s2 * rng.standard_normal(3)
         self._gyro_bias = _GYRO_BIAS_RAD_S * rng.standard_normal(3)
         self._barometer_bias = _BAROMETER_BIAS_M * rng.standard_normal()
         self._noise = NoiseRows(rng, _WIDTH)
+        self._row_before = self._noise.row
         self._steps_behind = 0
         self._last_fix = geographic_position((plant_state[0], plant_state[1], plant_state[2]))
 
@@ -113,15 +125,41 @@ class RawSensors:
         """What inertial unit, magnetometer and barometer read now."""
         state, noise = self._state, np.array(self._row())
         to_body = rotation_matrix(np.array(state[6:10])).T
-        specific_force = np.array(self._acceleration)
-        specific_force[2] += GRAVITY_M_S2
+        shaken = np.array(noise[_SHAKING]) - np.array(self._row_before[_SHAKING])
         return InertialSample(
             time_s,
-            to_body @ specific_force + self._acceleration_bias + _ACCELEROMETER_NOISE_M_S2 * noise[0:3],
+            self._specific_force(to_body)
+            + self._settings.accelerometer_noise_m_s2 * noise[0:3]
+            + self._vibration_m_s2() / math.sqrt(2.0) * shaken,
             np.array(state[10:13]) + self._gyro_bias + _GYRO_NOISE_RAD_S * noise[3:6],
             to_body @ np.array(_MAGNETIC_FIELD_GAUSS) + _MAGNETOMETER_NOISE_GAUSS * noise[6:9],
             float(HOME_ALTITUDE_M + state[2] + self._barometer_bias + _BAROMETER_NOISE_M * noise[9]),
         )
+
+    def accelerometer(self, time_s: float) -> AccelerometerSample:
+        """Mean of the accelerometer's last four readings.
+
+        Shaking is the change of something between readings, so that consecutive ones take it back: as in flight logs a
+        quarter of it is left in the mean of four, where white noise leaves a half.
+        """
+        noise = np.array(self._row())
+        to_body = rotation_matrix(np.array(self._state[6:10])).T
+        return AccelerometerSample(
+            time_s,
+            self._specific_force(to_body)
+            + self._settings.accelerometer_noise_m_s2 / math.sqrt(_READINGS) * noise[0:3]
+            + self._vibration_m_s2() / _READINGS * noise[_SHAKING],
+        )
+
+    def _specific_force(self, to_body: Array) -> Array:
+        force = np.array(self._acceleration)
+        force[2] += GRAVITY_M_S2
+        return np.asarray(to_body @ force) + self._acceleration_bias
+
+    def _vibration_m_s2(self) -> float:
+        speeds = self._state[13:]
+        turning = sum(speed * speed for speed in speeds) / max(1, len(speeds))
+        return self._settings.vibration_m_s2 * turning / self._hover_speed_rad_s**2
 
     def gnss(self, time_s: float) -> GnssSample:
         """What the GNSS receiver reads now."""
@@ -141,6 +179,7 @@ class RawSensors:
 
     def _row(self) -> list[float]:
         while self._steps_behind:
+            self._row_before = self._noise.row
             self._noise.advance()
             self._steps_behind -= 1
         return self._noise.row

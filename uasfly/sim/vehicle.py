@@ -15,6 +15,7 @@ import numpy as np
 
 from uasfly.errors import UasflyError
 from uasfly.messages import (
+    AccelerometerSample,
     Array,
     AttitudeTargetSample,
     BatterySample,
@@ -100,7 +101,12 @@ class SimulatedVehicle:
         self._boot_steps, self._jumped_s = self._steps, 0.0
         self._estimate = Estimate(self._scenario.sensors, np.random.default_rng(estimate_seed), self._state, STEP_S)
         self._sensors = RawSensors(
-            np.random.default_rng(sensor_seed), self._state, self._dynamics.acceleration, self._estimate
+            np.random.default_rng(sensor_seed),
+            self._state,
+            self._dynamics.acceleration,
+            self._estimate,
+            self._scenario.sensors,
+            self._plant.hover_speed_rad_s,
         )
         self._autopilot = Autopilot(
             self._plant.rotors,
@@ -298,9 +304,15 @@ class SimulatedVehicle:
         target = self._autopilot.target
         return AttitudeTargetSample(self.time_s, np.array(target.attitude), target.thrust)
 
-    def inertial(self) -> InertialSample:
-        """Accelerometer, gyro, magnetometer and barometer."""
-        return self._sensors.inertial(self.time_s)
+    def accelerometer(self) -> AccelerometerSample | None:
+        """Mean of the accelerometer's last readings; None while a fault keeps it silent."""
+        return self._faults.accelerometer(self._sensors.accelerometer(self.time_s))
+
+    def inertial(self) -> InertialSample | None:
+        """Accelerometer, gyro, magnetometer and barometer; None while a fault keeps them silent."""
+        sample = self._sensors.inertial(self.time_s)
+        told = self._faults.accelerometer(AccelerometerSample(sample.time_s, sample.acceleration_in_body))
+        return None if told is None else replace(sample, acceleration_in_body=told.specific_force_in_body)
 
     def gnss(self) -> GnssSample:
         """GNSS receiver."""

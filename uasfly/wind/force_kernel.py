@@ -21,7 +21,7 @@ LAG = 30  # samples: 0.3 s
 LAG_S = LAG * STEP_S
 WINDOW_S = (SAMPLES - 1) * STEP_S
 VELOCITY_NOISE_M_S = 0.02  # of one sample on the grid: PX4's velocity, as the scenarios and its own simulator have it
-_UNKNOWN = 1e3  # standard deviation of what is not known beforehand: the integral's and the force's first values
+UNKNOWN = 1e3  # standard deviation of what is not known beforehand: the integral's and the force's first values
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +48,13 @@ def force_kernel(density: float) -> ForceKernel:
     # Covariances of the integral with itself and with the force, for a walk that starts from zero.
     walk = density**2 * (product * earlier - total * earlier**2 / 2.0 + earlier**3 / 3.0)
     passed = np.minimum(then, times)
-    cross = density**2 * (times * passed - passed**2 / 2.0) + _UNKNOWN**2 * times
-    unknown = _UNKNOWN**2 * (1.0 + product)
+    cross = density**2 * (times * passed - passed**2 / 2.0) + UNKNOWN**2 * times
+    unknown = UNKNOWN**2 * (1.0 + product)
     seen = walk + unknown + VELOCITY_NOISE_M_S**2 * np.eye(SAMPLES)
     weights = np.linalg.solve(seen, cross)
     weights -= weights.mean()  # what the large variances cost in rounding
     noise = VELOCITY_NOISE_M_S**2 * float(weights @ weights)
-    walked = density**2 * then - 2.0 * float(weights @ (cross - _UNKNOWN**2 * times)) + float(weights @ walk @ weights)
+    walked = density**2 * then - 2.0 * float(weights @ (cross - UNKNOWN**2 * times)) + float(weights @ walk @ weights)
     return ForceKernel(density, weights, noise + walked)
 
 

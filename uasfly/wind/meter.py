@@ -2,6 +2,8 @@
 
 Fed with every odometry sample, which is only kept; five times a second those since then are looked at together. How
 much the wind changes is not known beforehand: the force's own changes over a second tell it, and choose the kernel.
+Velocity and attitude alone tell the wind of a third of a second ago; where an accelerometer feels the air, it is told
+as it is just now.
 
 The force is the thrust-free one of PX4's velocity and attitude, not the observer's state: that lags 0.12 s behind
 gusts, is noisier in weak wind, and contains the thrust's errors times the tilt; its velocity lags behind gusts too. The
@@ -10,6 +12,7 @@ observer says which samples are to be believed, and how well the velocity is kno
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import deque
 from dataclasses import replace
@@ -17,10 +20,12 @@ from dataclasses import replace
 import numpy as np
 
 from uasfly.airframe import GRAVITY_M_S2, Limits, WindSettings
-from uasfly.messages import Array, OdometrySample, StateEstimate
+from uasfly.messages import AccelerometerSample, Array, OdometrySample, Sample, StateEstimate
+from uasfly.wind.direct_kernel import DIRECT_LAG_S, LEVELS, direct_kernel, level_of
 from uasfly.wind.drag_curve import DragCurve
-from uasfly.wind.force_kernel import LAG_S, SAMPLES, STEP_S, WINDOW_S, kernels
-from uasfly.wind.from_force import Uncertainty, air_relative, wind_covariance
+from uasfly.wind.felt_force import LONGEST_GAP_S, FeltForce
+from uasfly.wind.force_kernel import LAG_S, SAMPLES, STEP_S, WINDOW_S, ForceKernel, kernels
+from uasfly.wind.from_force import Pair, Uncertainty, air_relative, wind_covariance
 from uasfly.wind.thrust_free import impulses, slopes, thrust
 from uasfly.wind_messages import WindEstimate
 
@@ -33,6 +38,7 @@ LONGEST_PAUSE_S = 0.3  # between samples; after a longer one the meter starts ag
 SHORTEST_STEP_S = 1e-3
 BELIEVED_M_S = 0.5  # a velocity farther from the estimate than this, and three sigmas, is an error of PX4's
 UNKNOWN_VELOCITY_M_S = 0.5  # with a velocity that is known no better the vehicle only believes what it knew of the wind
+CONTRADICTION_M_S2 = 0.3  # accelerometer against motion, over the window: several times its bias and the tilt's error
 CHANGE = 5  # intervals over which the force's change is looked at: a second
 CHANGE_MEMORY_S = 5.0
 FIRST_DENSITY = 0.5  # m/s^2/sqrt(s)
@@ -48,23 +54,32 @@ class WindMeter:
     Args:
         settings: identified drag and its sigmas.
         limits: tilt and thrust, for what can be held.
+        feels: whether the accelerometer is used, where there is one: with it the wind is told as it is now.
     """
 
-    def __init__(self, settings: WindSettings, limits: Limits) -> None:
+    def __init__(self, settings: WindSettings, limits: Limits, feels: bool = True) -> None:
+        self._feels = feels
         self._settings = settings
         self._limits = limits
         self._curve = DragCurve(settings.drag_1_s, settings.drag_1_m)
         self._kernels = kernels()
+        if feels:  # here, not in flight
+            for kernel, level in itertools.product(self._kernels, range(LEVELS)):
+                direct_kernel(kernel.density, level)
         self._steps = np.log2([kernel.density for kernel in self._kernels])
         self._arrived: list[OdometrySample] = []
         self._fresh: list[OdometrySample] = []
+        self._felt = FeltForce()
         self._latest: WindEstimate | None = None
         self._next_s = -math.inf
         self._begin()
 
-    def add(self, sample: OdometrySample) -> None:
-        """Take in a sample, before the step of its cycle."""
-        self._arrived.append(sample)
+    def add(self, sample: Sample) -> None:
+        """Take in a sample, before the step of its cycle; kinds that say nothing of the wind are ignored."""
+        if isinstance(sample, OdometrySample):
+            self._arrived.append(sample)
+        elif self._feels and isinstance(sample, AccelerometerSample):
+            self._felt.add(sample)
 
     def step(
         self, time_s: float, estimate: StateEstimate | None, in_air: bool, k_thrust_m_s2: float
@@ -79,6 +94,7 @@ class WindMeter:
         """
         if not in_air or estimate is None:
             self._arrived.clear()
+            self._felt.forget()
             if self._fresh or self._latest is not None:
                 self._begin()
             return None
@@ -94,6 +110,7 @@ class WindMeter:
         self._fresh.clear()
         self._newest_s = -math.inf
         self._latest = None
+        self._felt.forget()
         self._times: Array = np.empty(0)  # of the last seconds: time, integral of the force, slope, velocity
         self._integral: Array = np.empty((0, 2))
         self._slopes: Array = np.empty((0, 2))
@@ -117,15 +134,13 @@ class WindMeter:
         end_s = float(self._times[-1])
         if end_s - float(self._times[0]) < WINDOW_S:
             return None
-        then_s = end_s - LAG_S
         kernel = self._kernels[int(np.abs(self._steps - math.log2(self._density)).argmin())]
-        grid = end_s - WINDOW_S + STEP_S * np.arange(SAMPLES)
-        seen = (self._integral[:, 0], self._integral[:, 1], self._velocities[:, 2])
-        east_h, north_h, up_h = (float(kernel.weights @ np.interp(grid, self._times, values)) for values in seen)
+        up_h = float(kernel.weights @ self._on_grid(self._velocities[:, 2], end_s))
+        then_s, force, variance = self._force_now(end_s, kernel.density) or self._force_then(end_s, kernel)
         index = int(np.searchsorted(self._times, then_s))
         east_s, north_s = self._slopes[index].tolist()
         east_v, north_v, up_v = self._velocities[index].tolist()
-        force, slope = (east_h, north_h), (east_s, north_s)
+        slope = (east_s, north_s)
         curve = self._curve.under_thrust(thrust(up_h, slope))
         (east, north), speed = air_relative(force, slope, up_v, curve)
         self._follow_changes(force)
@@ -133,7 +148,28 @@ class WindMeter:
         self._looks += 1
         if len(self._winds) * INTERVAL_S < LEAST_MEAN_S:
             return None
-        return self._tell(then_s, force, slope, speed, worst, kernel.variance, k_thrust_m_s2)
+        return self._tell(then_s, force, slope, speed, worst, variance, k_thrust_m_s2)
+
+    def _force_now(self, end_s: float, density: float) -> tuple[float, Pair, float] | None:
+        """Time, force and its variance DIRECT_LAG_S ago, with the accelerometer; None where it tells too little."""
+        newest_s = self._felt.newest_s(end_s)
+        level = None if newest_s is None else level_of(self._felt.sigma_m_s2(density))
+        if newest_s is None or level is None or newest_s - WINDOW_S < self._times[0]:
+            return None
+        kernel, felt = direct_kernel(density, level), self._felt.up_to(newest_s)
+        integral = np.column_stack([self._on_grid(self._integral[:, axis], newest_s) for axis in range(2)])
+        if np.abs(felt.mean(axis=0) - (integral[-1] - integral[0]) / WINDOW_S).max() > CONTRADICTION_M_S2:
+            return None
+        east, north = (kernel.of_integral @ integral + kernel.of_felt @ felt).tolist()
+        return newest_s - DIRECT_LAG_S, (east, north), kernel.variance
+
+    def _force_then(self, end_s: float, kernel: ForceKernel) -> tuple[float, Pair, float]:
+        """The same LAG_S ago, without it."""
+        east, north = (float(kernel.weights @ self._on_grid(self._integral[:, axis], end_s)) for axis in range(2))
+        return end_s - LAG_S, (east, north), kernel.variance
+
+    def _on_grid(self, values: Array, end_s: float) -> Array:
+        return np.asarray(np.interp(end_s - WINDOW_S + STEP_S * np.arange(SAMPLES), self._times, values))
 
     def _sort_out(self, estimate: StateEstimate) -> None:
         """Keep what follows in time and is near the estimate; after a pause begin again."""
@@ -161,14 +197,17 @@ class WindMeter:
             return
         times = np.array([sample.time_s for sample in fresh])
         velocities = np.array([sample.velocity_in_world for sample in fresh])
-        slopes_of = slopes(np.array([sample.quaternion_body_to_world for sample in fresh]))
+        quaternions = np.array([sample.quaternion_body_to_world for sample in fresh])
+        slopes_of = slopes(quaternions)
+        self._felt.take(times, quaternions)
         if len(self._times):
             times = np.concatenate((self._times[-1:], times))
             velocities = np.concatenate((self._velocities[-1:], velocities))
             slopes_of = np.concatenate((self._slopes[-1:], slopes_of))
         start = self._integral[-1:] if len(self._integral) else np.zeros((1, 2))
         integral = np.concatenate((start, start + np.cumsum(impulses(times, velocities, slopes_of), axis=0)))
-        keep = slice(max(0, int(np.searchsorted(self._times, times[-1] - WINDOW_S)) - 1), max(0, len(self._times) - 1))
+        start_s = times[-1] - WINDOW_S - LONGEST_GAP_S  # what is felt may be so much behind
+        keep = slice(max(0, int(np.searchsorted(self._times, start_s)) - 1), max(0, len(self._times) - 1))
         self._times = np.concatenate((self._times[keep], times))
         self._velocities = np.concatenate((self._velocities[keep], velocities))
         self._slopes = np.concatenate((self._slopes[keep], slopes_of))

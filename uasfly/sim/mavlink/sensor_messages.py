@@ -22,9 +22,11 @@ _EPH, _EPV = 70, 110  # dilution of precision times 100, and
 _VELOCITY_ACCURACY_MM_S = 400  # accuracy of PX4's simulated receiver
 
 
-def highres_imu(view: VehicleView) -> Message:
-    """HIGHRES_IMU."""
+def highres_imu(view: VehicleView) -> Message | None:
+    """HIGHRES_IMU; None where the inertial unit says nothing."""
     sample = view.vehicle.inertial()
+    if sample is None:
+        return None
     return dialect.MAVLink_highres_imu_message(
         microseconds(sample.time_s),
         *swap_flu_frd(sample.acceleration_in_body).tolist(),
@@ -39,9 +41,11 @@ def highres_imu(view: VehicleView) -> Message:
     )
 
 
-def scaled_pressure(view: VehicleView) -> Message:
-    """SCALED_PRESSURE."""
+def scaled_pressure(view: VehicleView) -> Message | None:
+    """SCALED_PRESSURE; None where the inertial unit, whose barometer it is, says nothing."""
     sample = view.vehicle.inertial()
+    if sample is None:
+        return None
     pressure = pressure_of_altitude_hpa(sample.pressure_altitude_m)
     return dialect.MAVLink_scaled_pressure_message(
         milliseconds(sample.time_s), pressure, 0.0, round(TEMPERATURE_C * 100.0), 0

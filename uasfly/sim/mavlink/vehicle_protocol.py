@@ -98,8 +98,8 @@ class Vehicle(Protocol):
         """What the attitude controller is asked for."""
         ...
 
-    def inertial(self) -> InertialSample:
-        """Accelerometer, gyro, magnetometer and barometer."""
+    def inertial(self) -> InertialSample | None:
+        """Accelerometer, gyro, magnetometer and barometer; None where they say nothing."""
         ...
 
     def gnss(self) -> GnssSample:
