@@ -40,6 +40,7 @@ from uasfly.messages import (
 from uasfly.mission import Mission
 from uasfly.observer.diagnosis import Diagnosis
 from uasfly.observer.observer import Observer
+from uasfly.observer.pairs import paired
 from uasfly.preflight_messages import PreflightCheck
 from uasfly.wind.drag_curve import wind_settings
 from uasfly.wind.meter import WindMeter
@@ -151,12 +152,8 @@ class Pilot:
             time_s: now, host time.
             samples: what has arrived since the last cycle.
         """
-        self.view.update(samples)
+        self._take_in(samples)
         meter = self._wind_meter
-        for sample in samples:
-            self.observer.add(sample)
-            if meter is not None:
-                meter.add(sample)
         text = self._thrust.step(time_s, self._estimate, self.view.in_air)
         if text:
             self.announce(4, text)
@@ -195,6 +192,14 @@ class Pilot:
         self._streamed = setpoint is not None
         self._control, self._time_s = control, time_s
         return StepResult(setpoint, requests, self._status(time_s, estimate, alarms), control, checks)
+
+    def _take_in(self, samples: tuple[Sample, ...]) -> None:
+        self.view.update(samples)
+        for sample in paired(samples):
+            self.observer.add(sample)
+        if self._wind_meter is not None:
+            for sample in samples:
+                self._wind_meter.add(sample)
 
     def _check_before_flight(
         self, time_s: float, samples: tuple[Sample, ...], estimate: StateEstimate | None
