@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from uasfly.frames import quaternion_from_euler, rotation_matrix
-from uasfly.messages import AccelerometerSample
+from uasfly.messages import AccelerometerSample, Array
 from uasfly.wind.direct_kernel import FELT_SAMPLES, FELT_STEP_S
 from uasfly.wind.felt_force import FeltForce, horizontal_force
 
@@ -27,12 +27,12 @@ def test_it_is_the_thrust_free_force() -> None:
             np.testing.assert_allclose(horizontal_force(in_plane, ATTITUDES)[row], expected, atol=1e-12)
 
 
-def felt(forces: np.ndarray, begin_s: float = 10.0) -> FeltForce:
+def felt(forces: Array, begin_s: float = 10.0) -> FeltForce:
     """After samples (n, 2) every 20 ms, level and facing east."""
     result = FeltForce()
     for k, (x, y) in enumerate(forces.tolist()):
         result.add(AccelerometerSample(begin_s + FELT_STEP_S * k, np.array((x, y, 9.8))))
-    times = begin_s + 0.01 * np.arange(2 * len(forces))
+    times: Array = begin_s + 0.01 * np.arange(2.0 * len(forces), dtype=np.float64)
     result.take(times, np.tile((1.0, 0.0, 0.0, 0.0), (len(times), 1)))
     return result
 
