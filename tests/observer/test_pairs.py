@@ -14,6 +14,7 @@ from uasfly.observer.pairs import paired
 
 
 def odometry(time_s: float, roll_rad: float = 0.0, speed_m_s: float = 0.0, resets: int = 0) -> OdometrySample:
+    """Flying east at a speed, turned about the nose."""
     quaternion = quaternion_from_euler(roll_rad, 0.0, 0.3)
     place = np.array((speed_m_s * time_s, 0.0, 2.0))
     return OdometrySample(time_s, place, np.array((speed_m_s, 0.0, 0.0)), quaternion, np.array((0.0, 0.1, 0.0)), resets)
