@@ -71,6 +71,15 @@ def test_results_come_with_their_times_and_the_newest_prediction(watch: Callable
     assert watched.worker.counts.pid != os.getpid()
 
 
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="this system has no such thing")
+def test_detection_leaves_half_of_the_cores_to_the_flight(watch: Callable[..., Watched]) -> None:
+    """It keeps to the upper half of them; of one core it takes that one."""
+    watched = watch(workers.Numbers, workers.make_read_number)
+    watched.until(lambda: bool(watched.seen))
+    cores = sorted(os.sched_getaffinity(0))
+    assert os.sched_getaffinity(watched.worker.counts.pid) == set(cores[len(cores) // 2 :])
+
+
 def test_a_killed_process_is_started_again(watch: Callable[..., Watched]) -> None:
     """Its death is announced, and that it works again."""
     watched = watch(workers.Numbers, workers.make_read_number)

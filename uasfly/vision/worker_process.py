@@ -93,11 +93,23 @@ class Failure:
 Message: TypeAlias = Seen[Any] | Started | Alive | Told | Failure
 
 
+def keep_to_half_of_the_cores() -> None:
+    """The other half stays free, and its caches warm, for the flight: priorities alone let its worst cycles double.
+
+    Raises:
+        OSError: the system does not let us.
+    """
+    if hasattr(os, "sched_setaffinity"):
+        cores = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, cores[len(cores) // 2 :])
+
+
 def run(pipe: Connection[Any, Any], job: Job[Any, Any]) -> None:
     """Work until the pipe ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the flight, which ends this process
     with contextlib.suppress(OSError):
         os.nice(job.niceness)
+        keep_to_half_of_the_cores()
     import cv2
 
     cv2.setNumThreads(1)
