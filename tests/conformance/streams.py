@@ -112,7 +112,7 @@ def _positions_in_flight(recording: Recording, flight: Flight) -> list[Row]:
 def _silent_intervals(recording: Recording) -> list[Row]:
     """Intervals of the streams that are left out are accepted, as PX4 accepts them where it has no data."""
     streamed = {one.number for one in recording.received} & set(LEFT_OUT) - _EVENTS
-    silent = ", ".join(str(number) for number in sorted(streamed & set(SILENT_IDS)))
+    silent = ", ".join(str(number) for number in sorted(streamed & {*SILENT_IDS, dialect.MAVLINK_MSG_ID_ESC_STATUS}))
     wanted = ", ".join(str(number) for number in sorted(streamed))
     return [same("message set", "streams left out whose interval may be set", wanted, silent)]
 

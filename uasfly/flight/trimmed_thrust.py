@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from uasfly.control.controller import Controller
-from uasfly.control.thrust_trim import ThrustTrim
+from uasfly.control.thrust_trim import LIMIT, ROTOR_WALK_DENSITY, WALK_DENSITY, ThrustTrim
 from uasfly.messages import StateEstimate
 from uasfly.observer.observer import Observer
 
@@ -19,11 +19,15 @@ TOLD_AGAIN = 0.05
 class TrimmedThrust:
     """The thrust trim of one flight.
 
+    Where rotor speeds tell the thrust, they tell the commands' trim too, in seconds; the vertical force then says, over
+    minutes, what is wrong with the thrust by rotors. Without them it says that of the commands.
+
     Args:
         observer, controller: who reckon with it.
 
     Attributes:
         trim: share by which the thrust is more (negative: less) than the airframe file says for command and voltage.
+        rotor_trim: the same for rotor speeds.
     """
 
     def __init__(self, observer: Observer, controller: Controller) -> None:
@@ -32,7 +36,7 @@ class TrimmedThrust:
         self._due_s = -math.inf
         self._flies = False
         self._told = 0.0
-        self.trim = self._taken = 0.0
+        self.trim = self.rotor_trim = self._taken = 0.0
 
     def step(self, time_s: float, estimate: StateEstimate | None, in_air: bool) -> str:
         """Before the observer is asked for `time_s`; frozen on the ground.
@@ -52,18 +56,30 @@ class TrimmedThrust:
         if not in_air or estimate is None or time_s < self._due_s:
             return ""
         self._due_s = time_s + INTERVAL_S - 1e-6
-        before, up = self.trim, 2
-        trim = self._estimator.update(
+        ratio = self._observer.rotor_ratio
+        before, rotors_before = self.trim, self.rotor_trim
+        if ratio is None:
+            trim = self._ask_force(time_s, estimate, before, WALK_DENSITY)
+        else:
+            self.rotor_trim = self._ask_force(time_s, estimate, rotors_before, ROTOR_WALK_DENSITY)
+            share = (1.0 + before) * ratio * (1.0 + self.rotor_trim) / (1.0 + rotors_before)
+            trim = min(max(share - 1.0, -LIMIT), LIMIT)
+        if trim == before and self.rotor_trim == rotors_before:
+            return ""
+        self.trim, self._taken = trim, self._controller.trim_thrust(trim)
+        self._observer.correct_thrust((1.0 + trim) / (1.0 + before), (1.0 + self.rotor_trim) / (1.0 + rotors_before))
+        return self._tell(trim)
+
+    def _ask_force(self, time_s: float, estimate: StateEstimate, trim: float, walk_density: float) -> float:
+        """The trim of whichever thrust the observer has flown by, after one more estimate."""
+        up, estimator = 2, self._estimator
+        estimator.trim, estimator.walk_density = trim, walk_density
+        return estimator.update(
             time_s,
             float(estimate.force_in_world[up]),
             float(estimate.force_sigma_m_s2[up]),
             float(estimate.velocity_in_world[up]),
         )
-        if trim == before:
-            return ""
-        self.trim, self._taken = trim, self._controller.trim_thrust(trim)
-        self._observer.correct_thrust((1.0 + trim) / (1.0 + before))
-        return self._tell(trim)
 
     def k_thrust_m_s2(self, battery_voltage_v: float | None) -> float:
         """Thrust acceleration at full command [m/s^2], whatever of the trim the controller takes."""
