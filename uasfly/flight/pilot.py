@@ -154,7 +154,7 @@ class Pilot:
         """
         self._take_in(samples)
         meter = self._wind_meter
-        text = self._thrust.step(time_s, self._estimate, self.view.in_air)
+        text = self._thrust.step(time_s, self._estimate, self.view.in_air, self._wind)
         if text:
             self.announce(4, text)
         k_thrust = self._thrust.k_thrust_m_s2(self.view.voltage_v)

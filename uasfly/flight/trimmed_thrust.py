@@ -8,19 +8,22 @@ from uasfly.control.controller import Controller
 from uasfly.control.thrust_trim import LIMIT, ROTOR_WALK_DENSITY, WALK_DENSITY, ThrustTrim
 from uasfly.messages import StateEstimate
 from uasfly.observer.observer import Observer
+from uasfly.wind_messages import WindEstimate
 
 INTERVAL_S = 0.2
 OFF_THE_GROUND_S = 3.0  # until then the ground carries a part, or the force still forgets that it did
 SURE_SIGMA = 0.03  # of the trim, before anything is told
 LESS_TOLD, MORE_TOLD = 0.1, 0.2  # wind across the rotors lifts: in 8 m/s the thrust is 7 % more on a sound vehicle
 TOLD_AGAIN = 0.05
+STILL_M_S = 2.0  # of airspeed: faster air across the rotors changes their thrust by more than half a percent
 
 
 class TrimmedThrust:
     """The thrust trim of one flight.
 
     Where rotor speeds tell the thrust, they tell the commands' trim too, in seconds; the vertical force then says, over
-    minutes, what is wrong with the thrust by rotors. Without them it says that of the commands.
+    minutes of still air, what is wrong with the thrust by rotors. Without them it says that of the commands, in all
+    air: wind across the rotors lifts, which then goes into the trim.
 
     Args:
         observer, controller: who reckon with it.
@@ -38,13 +41,14 @@ class TrimmedThrust:
         self._told = 0.0
         self.trim = self.rotor_trim = self._taken = 0.0
 
-    def step(self, time_s: float, estimate: StateEstimate | None, in_air: bool) -> str:
+    def step(self, time_s: float, estimate: StateEstimate | None, in_air: bool, wind: WindEstimate | None) -> str:
         """Before the observer is asked for `time_s`; frozen on the ground.
 
         Args:
             time_s: now.
             estimate: of the cycle before.
             in_air: whether the vehicle flies.
+            wind: of the cycle before, None where it is not known.
 
         Returns:
             What is to be told; "" nearly always.
@@ -61,7 +65,8 @@ class TrimmedThrust:
         if ratio is None:
             trim = self._ask_force(time_s, estimate, before, WALK_DENSITY)
         else:
-            self.rotor_trim = self._ask_force(time_s, estimate, rotors_before, ROTOR_WALK_DENSITY)
+            if wind is not None and _fastest_air_m_s(estimate, wind) < STILL_M_S:
+                self.rotor_trim = self._ask_force(time_s, estimate, rotors_before, ROTOR_WALK_DENSITY)
             share = (1.0 + before) * ratio * (1.0 + self.rotor_trim) / (1.0 + rotors_before)
             trim = min(max(share - 1.0, -LIMIT), LIMIT)
         if trim == before and self.rotor_trim == rotors_before:
@@ -92,3 +97,9 @@ class TrimmedThrust:
         self._told = size + TOLD_AGAIN
         kind = "less" if trim < 0.0 else "more"
         return f"thrust is {size * 100.0:.0f} % {kind} than the airframe file says; payload, battery, propellers?"
+
+
+def _fastest_air_m_s(estimate: StateEstimate, wind: WindEstimate) -> float:
+    """Airspeed, or the strongest gust so far: in gusty air a lull is no time to learn."""
+    (east, north), (vx, vy, _) = wind.velocity_in_world.tolist(), estimate.velocity_in_world.tolist()
+    return max(math.hypot(east - vx, north - vy), wind.gust_m_s)
