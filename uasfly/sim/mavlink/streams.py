@@ -22,7 +22,7 @@ from uasfly.sim.mavlink import status_messages as status
 from uasfly.sim.mavlink.framing import Message
 from uasfly.sim.mavlink.identity import PROTOCOL_VERSION_ID, Identity
 from uasfly.sim.mavlink.scheduler import Stream
-from uasfly.sim.mavlink.sensor_messages import Gnss, esc_status, highres_imu, scaled_pressure
+from uasfly.sim.mavlink.sensor_messages import ESC_STATUS_ID, Gnss, esc_status, highres_imu, scaled_pressure
 from uasfly.sim.mavlink.vehicle_view import VehicleView
 
 LOOP_HZ = 250.0  # attitude and sensors: PX4's control loop
@@ -104,7 +104,7 @@ def streams(identity: Identity, now_s: Callable[[], float], unix_s: Callable[[],
         (dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, 0.0, motion.global_origin, 1.0),
         (dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0.0, lambda _: identity.autopilot_version(), 1.0),
         (PROTOCOL_VERSION_ID, 0.0, lambda _: identity.protocol_version(), 1.0),
-        (dialect.MAVLINK_MSG_ID_ESC_STATUS, 0.0, esc_status, ROTOR_HZ),
+        (ESC_STATUS_ID, 0.0, esc_status, ROTOR_HZ),
         (dialect.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 0.0, motion.truth, TRUTH_HZ),
     ]
     return [Stream(*row) for row in table] + [Stream(number, 0.0, lambda _: None, 1.0) for number in SILENT_IDS]
