@@ -30,7 +30,7 @@ def airframe(hover_rad_s: float | None = HOVER_RAD_S) -> Airframe:
 
 def steady(index: int) -> Array:
     """Speeds of a hover; the last digits change, as measured ones do."""
-    return HOVER_RAD_S + 0.1 * np.sin(index + np.arange(6.0))
+    return np.asarray(HOVER_RAD_S + 0.1 * np.sin(index + np.arange(6.0)))
 
 
 def hover(observer: Observer, speeds: Speeds, end_s: float = 2.0, begin_s: float = 0.0) -> StateEstimate:
@@ -73,7 +73,7 @@ def frozen(_: int) -> Array:
 
 def stopped(index: int) -> Array:
     """One rotor stands, or says so."""
-    return steady(index) * (np.arange(6) != 2)
+    return np.asarray(steady(index) * (np.arange(6) != 2))
 
 
 @pytest.mark.parametrize(

@@ -306,8 +306,10 @@ def test_rotor_speeds_are_told_where_the_scenario_says_so() -> None:
     assert np.mean(rows) == pytest.approx(509.5, rel=0.01)
     assert 0.5 < np.std(np.diff(rows, axis=0)) < 5.0
     for says in ("nothing", "zero", "frozen"):
-        vehicle.inject(RotorSpeeds(kind="rotor_speeds", says=says, at_s=0.0))
-        before, after = vehicle.rotors(), (vehicle.advance_to(vehicle.time_s + 0.02), vehicle.rotors())[1]
+        vehicle.inject(RotorSpeeds(kind="rotor_speeds", says=says))
+        before = vehicle.rotors()
+        vehicle.advance_to(vehicle.time_s + 0.02)
+        after = vehicle.rotors()
         assert (before is None) is (says == "nothing")
         if before is not None and after is not None:
             assert bool(before.speeds_rad_s[0] == 0.0) is (says == "zero")

@@ -44,6 +44,8 @@ class RotorAssembler:
         speeds = [_RAD_S_PER_RPM * rpm for rpm in fields["rpm"]]
         if len(speeds) != _BATCH or index not in range(0, MOST_ROTORS, _BATCH):
             raise ValueError(f"expected {_BATCH} rotors from 0, 4, .. on, found {len(speeds)} from {index} on")
+        if not math.isfinite(sum(speeds)):
+            raise ValueError(f"expected finite speeds, found {speeds}")
         if index == 0:
             self._time_us, self._speeds = time_us, []
         if time_us != self._time_us or len(self._speeds) != index:
