@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from uasfly.control.controller import Controller
 from uasfly.control.thrust_trim import LIMIT, ROTOR_WALK_DENSITY, WALK_DENSITY, ThrustTrim
+from uasfly.frames import rotation_matrix
 from uasfly.messages import StateEstimate
 from uasfly.observer.observer import Observer
 from uasfly.wind_messages import WindEstimate
@@ -85,6 +87,14 @@ class TrimmedThrust:
             float(estimate.force_sigma_m_s2[up]),
             float(estimate.velocity_in_world[up]),
         )
+
+    def as_commanded(self, estimate: StateEstimate) -> StateEstimate:
+        """The estimate for a controller that takes thrust for what it commands: what is missing of it is a force."""
+        excess_m_s2 = self._observer.rotor_excess_m_s2
+        if excess_m_s2 == 0.0:
+            return estimate
+        up_in_world = rotation_matrix(estimate.quaternion_body_to_world)[:, 2]
+        return replace(estimate, force_in_world=estimate.force_in_world + excess_m_s2 * up_in_world)
 
     def k_thrust_m_s2(self, battery_voltage_v: float | None) -> float:
         """Thrust acceleration at full command [m/s^2], whatever of the trim the controller takes."""

@@ -161,6 +161,11 @@ class Observer:
         timeline = self._timeline
         return self._rotors.ratio if timeline is not None and self._rotors.fresh(timeline.newest.time_s) else None
 
+    @property
+    def rotor_excess_m_s2(self) -> float:
+        """By how much the thrust is just now more than commanded, by the rotors; nil where that is not known."""
+        return 0.0 if self.rotor_ratio is None else self._rotors.excess_m_s2
+
     def estimate(self, time_s: float) -> StateEstimate | None:
         """State at `time_s`; the sigmas are those of the newest measurement, or of `time_s` after SILENT_AFTER_S.
 

@@ -24,6 +24,9 @@ FROZEN_S = 0.5  # a rotor whose speed is the same to the last digit for so long 
 SET_BACK_S = 1.0
 _KEPT_S, _PRUNE_AT = 3.0, 512
 MEAN_TIME_S = 3.0  # of the means whose ratio is told
+EXCESS_TIME_S = (
+    0.5  # well above the rotors' lag, which the commands' dead time only stands for: thrust must not chase that
+)
 TOLD_AFTER_S = 1.0  # of flight with rotor data
 LARGEST_RATIO = 1.4  # of thrust by rotors over commands, and of its inverse: beyond, pole count or units are wrong
 FASTEST_SQUARED = 3.0  # mean square over that in hover: no multirotor's thrust is so much more than its weight
@@ -35,6 +38,10 @@ class RotorThrust:
     Args:
         airframe: number and hover speed of the rotors; without the speed the commands' thrust is all there is.
         commands: what the commands promise.
+
+    Attributes:
+        excess_m_s2: by how much the thrust is more (negative: less) than the commands promise, low-passed; where the
+            attitude takes of it, or the voltage sags under load.
 
     """
 
@@ -50,6 +57,8 @@ class RotorThrust:
         self._thrusts: list[float] = []  # of the file's hover speed
         self._speeds: list[float] = []  # of the sample before
         self._changed_s: list[float] = []  # when each of them was last another
+        self.excess_m_s2 = 0.0
+        self._commanded = 0.0  # thrust that the commands promised before the last sample
         self._by_rotors = self._by_commands = self._weight_s = 0.0  # means, both over the same time
 
     def add(self, sample: RotorSample, flies: bool) -> bool:
@@ -69,15 +78,18 @@ class RotorThrust:
         if thrust is None:
             return False
         if not flies:
-            self._by_rotors = self._by_commands = self._weight_s = 0.0
+            self._by_rotors = self._by_commands = self._weight_s = self.excess_m_s2 = 0.0
         elapsed_s = time_s - times[-1] if times else FRESH_S
         times.append(time_s)
         self._thrusts.append(thrust)
         if flies and 0.0 < elapsed_s <= FRESH_S:
-            kept = math.exp(-elapsed_s / MEAN_TIME_S)
+            kept, commanded = math.exp(-elapsed_s / MEAN_TIME_S), self._commands.mean(time_s - elapsed_s, time_s)
             self._by_rotors = kept * self._by_rotors + elapsed_s * thrust
-            self._by_commands = kept * self._by_commands + elapsed_s * self._commands.mean(time_s - elapsed_s, time_s)
+            self._by_commands = kept * self._by_commands + elapsed_s * commanded
             self._weight_s += elapsed_s
+            share = 1.0 - math.exp(-elapsed_s / EXCESS_TIME_S)
+            self.excess_m_s2 += share * (self._scale * thrust - commanded - self.excess_m_s2)
+            self._commanded = commanded
         if len(times) > _PRUNE_AT:
             keep_from = max(bisect_right(times, time_s - _KEPT_S) - 1, 0)
             del times[:keep_from], self._thrusts[:keep_from]
@@ -98,6 +110,9 @@ class RotorThrust:
     def rescale(self, commands: float, rotors: float) -> None:
         """Commands so far, and rotors for good (payload, density of the air), give so many times what was thought."""
         self._commands.rescale(commands)
+        if self._thrusts:
+            self.excess_m_s2 += (rotors - 1.0) * self._scale * self._thrusts[-1] - (commands - 1.0) * self._commanded
+        self._commanded *= commands
         self._by_commands *= commands
         self._scale *= rotors
         self._compare()
