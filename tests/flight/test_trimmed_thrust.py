@@ -15,6 +15,7 @@ from uasfly.drivers.plan import load_plan
 from uasfly.drivers.rehearse import rehearse
 from uasfly.flight.tracking_errors import MarkerDatum
 from uasfly.flight.trimmed_thrust import INTERVAL_S, OFF_THE_GROUND_S, TrimmedThrust
+from uasfly.frames import quaternion_from_euler
 from uasfly.messages import Sample, StateEstimate, Status, TruthSample
 from uasfly.observer import Observer
 from uasfly.wind_messages import WindEstimate
@@ -35,6 +36,7 @@ class Reckoning:
         self.texts: list[str] = []
         self.rotor_ratio: float | None = None  # as the observer tells it
         self.rotor_scale = 1.0
+        self.rotor_excess_m_s2 = 0.0
 
     def correct_thrust(self, commands: float, rotors: float = 1.0) -> None:
         """As the observer does."""
@@ -137,6 +139,17 @@ def test_what_stays_in_the_force_of_still_air_is_the_rotors(speed: float, gust: 
         reckoning.fly(float(second), second + 1.0, up=force)
     assert reckoning.trimmed.rotor_trim == pytest.approx(-0.05 if learns else 0.0, abs=0.01)
     assert reckoning.trimmed.trim == pytest.approx(reckoning.trimmed.rotor_trim, abs=1e-9)
+
+
+def test_a_controller_sees_what_is_missing_of_its_thrust_as_a_force() -> None:
+    """Along the body's z; without rotors the estimate goes through as it is."""
+    reckoning = Reckoning(0.0)
+    tilted = quaternion_from_euler(0.3, 0.0, 0.0)
+    estimate = StateEstimate(0.0, ZERO, ZERO, tilted, ZERO, np.array((0.1, 0.2, 0.3)), ZERO, SIGMA, SIGMA, SIGMA)
+    assert reckoning.trimmed.as_commanded(estimate) is estimate
+    reckoning.rotor_excess_m_s2 = -0.5
+    seen = reckoning.trimmed.as_commanded(estimate).force_in_world
+    np.testing.assert_allclose(seen, (0.1, 0.2 + 0.5 * math.sin(0.3), 0.3 - 0.5 * math.cos(0.3)))
 
 
 def test_when_rotors_fall_silent_the_force_takes_over_from_their_trim() -> None:

@@ -103,11 +103,13 @@ def test_a_trim_of_either_thrust_moves_only_what_acts() -> None:
     """Commands trimmed under rotors leave the force as it is; rotors trimmed move it by the share."""
     observer = Observer(airframe())
     before = hover(observer, steady)
+    assert observer.rotor_excess_m_s2 == pytest.approx(-GRAVITY_M_S2 * SAG / (1.0 - SAG), abs=0.05)
     observer.correct_thrust(1.0 - SAG)
     after = observer.estimate(2.0)
     assert after is not None
     np.testing.assert_allclose(after.force_in_world, before.force_in_world, atol=1e-9)
     assert observer.rotor_ratio == pytest.approx(1.0, abs=0.005)
+    assert observer.rotor_excess_m_s2 == pytest.approx(0.0, abs=0.03)
     observer.correct_thrust(1.0, 0.95)
     moved = observer.estimate(2.0)
     assert moved is not None

@@ -24,9 +24,7 @@ FROZEN_S = 0.5  # a rotor whose speed is the same to the last digit for so long 
 SET_BACK_S = 1.0
 _KEPT_S, _PRUNE_AT = 3.0, 512
 MEAN_TIME_S = 3.0  # of the means whose ratio is told
-EXCESS_TIME_S = (
-    0.5  # well above the rotors' lag, which the commands' dead time only stands for: thrust must not chase that
-)
+EXCESS_TIME_S = 0.5  # well above the rotors' lag, which the commands' dead time only stands for
 TOLD_AFTER_S = 1.0  # of flight with rotor data
 LARGEST_RATIO = 1.4  # of thrust by rotors over commands, and of its inverse: beyond, pole count or units are wrong
 FASTEST_SQUARED = 3.0  # mean square over that in hover: no multirotor's thrust is so much more than its weight
