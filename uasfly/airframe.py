@@ -48,6 +48,10 @@ class ModelParameters(FileModel):
             ge=0.0, le=0.3, description="the same of the thrust, which is not behind an attitude loop, where it differs"
         ),
     ] = None
+    hover_rotor_rad_s: Annotated[
+        Positive | None,
+        Field(description="speed of the rotors that carries the weight in still air at sea level; null: not used"),
+    ] = None
 
     @property
     def thrust_acts_after_s(self) -> float:

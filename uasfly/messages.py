@@ -19,6 +19,7 @@ from uasfly.sensor_messages import AttitudeTargetSample as AttitudeTargetSample
 from uasfly.sensor_messages import BatterySample as BatterySample
 from uasfly.sensor_messages import MarkerSample as MarkerSample
 from uasfly.sensor_messages import OdometrySample as OdometrySample
+from uasfly.sensor_messages import RotorSample as RotorSample
 from uasfly.wind_messages import WindEstimate
 
 
@@ -163,6 +164,7 @@ class RequestResult:
 Sample = (
     OdometrySample
     | AccelerometerSample
+    | RotorSample
     | MarkerSample
     | AttitudeTargetSample
     | BatterySample

@@ -1,4 +1,4 @@
-"""What sensors say: PX4's estimate of its motion, accelerometer, marker poses, attitude targets, battery.
+"""What sensors say: PX4's estimate of its motion, accelerometer, rotor speeds, marker poses, attitude targets, battery.
 
 They flow like the other messages, and everybody takes them from `uasfly.messages`; frames, units and times as there.
 """
@@ -40,6 +40,19 @@ class AccelerometerSample:
 
     time_s: float
     specific_force_in_body: Array
+
+
+@message
+class RotorSample:
+    """Speeds of the rotors (ESC_STATUS), where the speed controllers tell them.
+
+    Attributes:
+        time_s: when they were true.
+        speeds_rad_s: (n,) in PX4's motor order; n may be more than there are rotors, the rest says nothing.
+    """
+
+    time_s: float
+    speeds_rad_s: Array
 
 
 @message

@@ -55,7 +55,10 @@ def _mission(**changes: Any) -> Mission:
 
 
 class FakeObserver:
-    """Knows exactly where the scripted vehicle is, and remembers what it was told."""
+    """Knows exactly where the scripted vehicle is, and remembers what it was told; no rotor tells its speed."""
+
+    rotor_ratio: float | None = None
+    rotor_excess_m_s2 = 0.0
 
     def __init__(self) -> None:
         self.position = GROUND.copy()
@@ -77,9 +80,10 @@ class FakeObserver:
         """Check what the filter would divide by."""
         assert k_thrust_m_s2 > 0.0
 
-    def correct_thrust(self, ratio: float) -> None:
+    def correct_thrust(self, commands: float, rotors: float = 1.0) -> None:
         """Check what the filter would multiply by."""
-        assert ratio > 0.0
+        assert commands > 0.0
+        assert rotors == 1.0
 
     def take_moved(self) -> list[tuple[int, float]]:
         """Nothing moves."""

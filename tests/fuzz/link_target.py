@@ -192,6 +192,10 @@ class LinkSession:
 
 def plausible(rng: Rng, name: str, sent: list[tuple[str, dict[str, Any]]]) -> dict[str, Any]:
     """Fields of a message as mavlink_direct delivers them, random but within what the wire carries, often answers."""
+    if name == "ESC_STATUS":  # unknown to pymavlink
+        rpm = rng.integers(-(2**31), 2**31, 4) if rng.random() < 0.2 else rng.integers(4000, 6000, 4)
+        time_us = int(rng.integers(2**63)) if rng.random() < 0.2 else 10**6
+        return {"index": 4 * int(rng.integers(2)), "time_usec": time_us, "rpm": rpm.tolist()}
     message = frames.CLASSES[name]
     fields = {key: _as_json(value) for key, value in frames.odd_fields(rng, message).items()}
     for key in ("q", "attitude_quaternion"):
@@ -229,7 +233,13 @@ def check_sample(sample: Sample) -> None:
         raise FindingError(f"a text that cannot be printed: {sample}")
     if not math.isfinite(sample.time_s) or sample.time_s > time.monotonic() + 1e-6:
         raise FindingError(f"a sample of no time that has been: {sample}")
-    for name in ("position_in_world", "velocity_in_world", "quaternion_body_to_world", "angular_rate_in_body"):
+    for name in (
+        "position_in_world",
+        "velocity_in_world",
+        "quaternion_body_to_world",
+        "angular_rate_in_body",
+        "speeds_rad_s",
+    ):
         values = getattr(sample, name, None)
         if values is not None and not (values.dtype == np.float64 and np.isfinite(values).all()):
             raise FindingError(f"{name} is not finite: {sample}")

@@ -29,6 +29,7 @@ from uasfly.messages import (
     Request,
     RequestKind,
     RequestResult,
+    RotorSample,
     Sample,
     TextSample,
     VehicleSample,
@@ -93,6 +94,7 @@ class PilotSession:
             *(OdometrySample(now - age, UP, zero, LEVEL, zero) for age in (0.012, 0.002)),
             VehicleSample(now, mode, True, True),
             AccelerometerSample(now - 0.01, np.array((0.0, 0.0, 9.8))),
+            RotorSample(now - 0.01, 509.5 + 0.1 * np.sin(1e3 * now + np.arange(6.0))),
             AttitudeTargetSample(now, LEVEL, 0.35),
             HealthSample(now, True, True, True, 3, 12, 0.3),
             BatterySample(now, 15.8, 0.9),
@@ -130,7 +132,7 @@ def _odd_sample(rng: Rng, now_s: float) -> Sample:
         made = rng.normal(size=4)
         return made / np.linalg.norm(made) if rng.random() < 0.7 else vector(4)
 
-    kind = rng.integers(10)
+    kind = rng.integers(11)
     if kind < 3:
         good = OdometrySample(time_s, UP, np.zeros(3), LEVEL, np.zeros(3), int(rng.integers(3)))
         part = rng.integers(6)
@@ -157,8 +159,9 @@ def _odd_sample(rng: Rng, now_s: float) -> Sample:
         return HealthSample(time_s, *flags, int(rng.integers(256)), int(rng.integers(256)), number())
     if kind == 7:
         return TextSample(time_s, int(rng.integers(-3, 300)), choice(rng, ("", "x", "\x1b[2J", "é" * 300)))
-    if kind == 8:
-        return AccelerometerSample(time_s, vector())
+    if kind in (8, 9):
+        rotors = kind == 9
+        return RotorSample(time_s, vector(int(rng.integers(9)))) if rotors else AccelerometerSample(time_s, vector())
     request = Request(choice(rng, list(RequestKind)), number())
     rebooted = LinkSample(time_s, LinkEvent.REBOOTED)
     return rebooted if rng.random() < 0.05 else RequestResult(time_s, request, bool(rng.integers(2)), "odd")

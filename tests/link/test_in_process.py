@@ -21,6 +21,7 @@ from uasfly.messages import (
     Request,
     RequestKind,
     RequestResult,
+    RotorSample,
     Sample,
     Setpoint,
     TextSample,
@@ -45,6 +46,7 @@ class ClockworkVehicle:
     targets: list[tuple[float, Array, float, float | None]] = field(default_factory=list)
     texts: list[TextSample] = field(default_factory=list)
     boots: int = 1
+    tells_rotors: bool = False
     link_faults: LinkFaults = field(default_factory=lambda: LinkFaults(np.random.default_rng(0)))
 
     def truth(self) -> TruthSample:
@@ -87,6 +89,10 @@ class ClockworkVehicle:
     def accelerometer(self) -> AccelerometerSample:
         """Carries its time."""
         return AccelerometerSample(self.time_s, np.array((self.time_s, 0.0, 9.8)))
+
+    def rotors(self) -> RotorSample | None:
+        """Carries its time, too."""
+        return RotorSample(self.time_s, np.full(6, self.time_s)) if self.tells_rotors else None
 
     def battery(self) -> BatterySample:
         """Full."""
@@ -131,13 +137,19 @@ def _fly(link: InProcessLink, seconds: float, period_s: float = 0.02) -> list[tu
 
 
 def test_streams_come_at_the_rates_that_px4_is_asked_for() -> None:
-    """Odometry 100 Hz, attitude target and accelerometer 50 Hz, state 2 Hz, battery 1 Hz, health 5 Hz."""
-    kinds = [type(sample) for _, sample in _fly(_link(ClockworkVehicle()), 10.0)]
+    """Odometry 100, attitude target, accelerometer and rotors 50, state 2, battery 1, health 5 Hz; no rotors: none."""
+    vehicle = ClockworkVehicle()
+    kinds = [type(sample) for _, sample in _fly(_link(vehicle), 10.0)]
+    assert RotorSample not in kinds
+    vehicle = ClockworkVehicle()
+    vehicle.tells_rotors = True
+    kinds = [type(sample) for _, sample in _fly(_link(vehicle), 10.0)]
     counts = {kind: kinds.count(kind) for kind in set(kinds)}
     assert counts == {
         OdometrySample: 1000,
         AttitudeTargetSample: 500,
         AccelerometerSample: 500,
+        RotorSample: 500,
         VehicleSample: 20,
         BatterySample: 10,
         HealthSample: 50,

@@ -26,6 +26,7 @@ from uasfly.messages import (
     Request,
     RequestKind,
     RequestResult,
+    RotorSample,
     StateEstimate,
     Status,
     VehicleSample,
@@ -65,6 +66,7 @@ def _equal(a: object, b: object) -> bool:
     [
         _odometry(0.1),
         AccelerometerSample(0.2, RNG.normal(size=3)),
+        RotorSample(0.2, RNG.normal(size=6)),
         _status(),
         VehicleSample(1.0, FlightMode.OFFBOARD, armed=True, in_air=False),
         RequestResult(2.0, Request(RequestKind.TAKEOFF, 1.5), accepted=False, text="preflight"),

@@ -19,7 +19,8 @@ def sensors_at_rest(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> 
     state = array("d", (0.0, 100.0, 2.0, 0.0, 0.0, 0.0, *quaternion_from_euler(roll, pitch, yaw), 0.0, 0.0, 0.0))
     estimate = Estimate(SETTINGS, np.random.default_rng(1), state, 0.004)
     still = array("d", (0.0, 0.0, 0.0))
-    return RawSensors(np.random.default_rng(2), state, still, estimate, SETTINGS, 500.0), estimate
+    rngs = np.random.default_rng(2), np.random.default_rng(3)
+    return RawSensors(rngs[0], state, still, estimate, SETTINGS, 500.0, rngs[1]), estimate
 
 
 def test_at_rest_the_accelerometer_measures_gravity_upwards() -> None:

@@ -12,6 +12,7 @@ from uasfly.errors import UasflyError
 from uasfly.files import find_file, load_file
 from uasfly.frames import euler_from_quaternion, quaternion_from_euler
 from uasfly.messages import FlightMode
+from uasfly.sim.faults import RotorSpeeds
 from uasfly.sim.scenario import Scenario, Sensors
 from uasfly.sim.vehicle import SimulatedVehicle
 from uasfly.sim.wind.settings import ConstantWind, WindSettings
@@ -284,6 +285,36 @@ def test_faults_refuse_and_shift() -> None:
     vehicle.set_gnss_offset((8.0, 0.0, 0.0))
     vehicle.advance_to(4.1)
     assert vehicle.odometry().position_in_world[0] == pytest.approx(8.0, abs=0.1)
+
+
+def test_rotor_speeds_are_told_where_the_scenario_says_so() -> None:
+    """In whole rpm, noisy, about hover's; nil on the ground. Faults silence them, freeze them, or have one stand."""
+    told = STILL.sensors.model_copy(update={"rotor_speeds": True})
+    vehicle = SimulatedVehicle(plant("f550"), STILL.model_copy(update={"sensors": told}), 1)
+    sample = vehicle.rotors()
+    assert sample is not None
+    assert sample.speeds_rad_s.tolist() == [0.0] * 6
+    take_off(vehicle, 3.0, 1.0)
+    rows = []
+    for _ in range(50):
+        vehicle.advance_to(vehicle.time_s + 0.02)
+        sample = vehicle.rotors()
+        assert sample is not None
+        rows.append(sample.speeds_rad_s)
+    rpm = np.array(rows) * 30.0 / math.pi
+    np.testing.assert_allclose(rpm, np.round(rpm), atol=1e-9)
+    assert np.mean(rows) == pytest.approx(509.5, rel=0.01)
+    assert 0.5 < np.std(np.diff(rows, axis=0)) < 5.0
+    for says in ("nothing", "zero", "frozen"):
+        vehicle.inject(RotorSpeeds(kind="rotor_speeds", says=says))
+        before = vehicle.rotors()
+        vehicle.advance_to(vehicle.time_s + 0.02)
+        after = vehicle.rotors()
+        assert (before is None) is (says == "nothing")
+        if before is not None and after is not None:
+            assert bool(before.speeds_rad_s[0] == 0.0) is (says == "zero")
+            assert (before.speeds_rad_s.tolist() == after.speeds_rad_s.tolist()) is (says == "frozen")
+    assert SimulatedVehicle(plant("f550"), STILL, 1).rotors() is None
 
 
 def test_changed_parameters_act_in_flight() -> None:

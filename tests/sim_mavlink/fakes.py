@@ -16,6 +16,7 @@ from uasfly.messages import (
     FlightMode,
     HealthSample,
     OdometrySample,
+    RotorSample,
     TextSample,
     TruthSample,
     VehicleSample,
@@ -55,6 +56,7 @@ class FakeVehicle:
         self.boots = 1
         self.link_faults = LinkFaults(np.random.default_rng(0))
         self.injected: list[Fault] = []
+        self.rotor_speeds: Array | None = None
 
     def inject(self, fault: Fault) -> None:
         self.injected.append(fault)
@@ -114,6 +116,9 @@ class FakeVehicle:
         return InertialSample(
             self.time_s, np.array((0.1, 0.2, 9.8)), np.array((0.3, 0.4, 0.5)), np.array((0.2, 0.1, -0.4)), 489.666
         )
+
+    def rotors(self) -> RotorSample | None:
+        return None if self.rotor_speeds is None else RotorSample(self.time_s, self.rotor_speeds)
 
     def gnss(self) -> GnssSample:
         fix, satellites = (3, 10) if self.gnss_available else (0, 0)

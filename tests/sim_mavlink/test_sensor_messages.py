@@ -1,11 +1,14 @@
 import math
+import struct
 
+import numpy as np
 import pytest
+from pymavlink.dialects.v20 import development as dialect
 
 from tests.sim_mavlink.bench import Bench, only
 from uasfly.files import find_file, load_file
 from uasfly.sim.faults import GnssDegraded
-from uasfly.sim.mavlink.sensor_messages import pressure_of_altitude_hpa
+from uasfly.sim.mavlink.sensor_messages import ESC_STATUS_ID, pressure_of_altitude_hpa
 from uasfly.sim.plant import Plant
 from uasfly.sim.scenario import Scenario
 from uasfly.sim.vehicle import SimulatedVehicle
@@ -63,3 +66,29 @@ def test_a_receiver_that_knows_nothing_still_reports() -> None:
     vehicle.inject(GnssDegraded(kind="gnss_degraded", accuracy_m=1e8, satellites=0))
     message = only(Bench(vehicle=vehicle).run(0.5), "GPS_RAW_INT")[-1]
     assert message.h_acc == 0xFFFFFFFF
+
+
+def test_rotor_speeds_come_in_fours_when_they_are_asked_for() -> None:
+    """Six rotors: two messages of one time, filled up with zeros; from a vehicle that does not tell them, none."""
+    bench = Bench()
+    bench.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, ESC_STATUS_ID, 20000.0)
+    assert not rotor_payloads(bench, 0.2)
+    bench.vehicle.rotor_speeds = np.array((1000.0, 1001.0, 1002.0, 1003.0, 1004.0, 1005.0)) * 2.0 * math.pi / 60.0
+    received = rotor_payloads(bench, 1.0)
+    assert len(received) == pytest.approx(100, abs=4)
+    (time_us, *first), (same_us, *second) = received[-2:]
+    assert time_us == same_us
+    assert first == [1000, 1001, 1002, 1003, *(0.0,) * 8, 0]
+    assert second == [1004, 1005, 0, 0, *(0.0,) * 8, 4]
+
+
+def rotor_payloads(bench: Bench, duration_s: float) -> list[tuple[float, ...]]:
+    """Fields of ESC_STATUS in the order of the wire; pymavlink does not know the message."""
+    found = []
+    for _ in range(round(duration_s / bench.vehicle.step_s)):
+        bench.vehicle.advance_to(bench.vehicle.time_s + bench.vehicle.step_s)
+        for message in bench.endpoint.poll():
+            if message.get_msgId() == ESC_STATUS_ID:
+                payload = bytes(message.pack(dialect.MAVLink(None, 1, 1)))[10:-2]
+                found.append(struct.unpack("<Q4i8fB", payload.ljust(57, b"\0")))
+    return found

@@ -23,6 +23,7 @@ WIND_TIME_S = 3.0  # of the vertical wind's correlation, and of the low-pass tha
 LEAST_WIND_M_S2 = 0.1  # standard deviation of the slow part of its force, at least
 FIRST_WIND_M_S2 = 0.3
 RISE_S, FALL_S = 2.0, 15.0  # over which the variance is followed: a jet counts soon, a lull late
+ROTOR_WALK_DENSITY = 0.01 / math.sqrt(600.0)  # where rotor speeds tell the thrust: payload and air change little
 NEAR_HOVER_M_S = 0.3  # faster climbs change the rotors' inflow, and with it the thrust: by 3 % at this
 LARGEST_SIGMAS = 1.5  # an innovation beyond counts as one of this size (Huber 1964): the first second of a push
 LONGEST_STEP_S = 1.0  # what came before a longer pause tells nothing of the wind
@@ -33,10 +34,12 @@ class ThrustTrim:
 
     Attributes:
         trim: -LIMIT..LIMIT.
+        walk_density: [1/sqrt(s)] of its random walk.
     """
 
     def __init__(self) -> None:
         self.trim = 0.0
+        self.walk_density = WALK_DENSITY
         self._time_s = -math.inf
         self.lift_off()
 
@@ -75,7 +78,7 @@ class ThrustTrim:
         self._wind *= kept
         self._tw *= kept
         self._ww = kept * kept * self._ww + (1.0 - kept * kept) * self._variance
-        self._tt = min(self._tt + WALK_DENSITY * WALK_DENSITY * elapsed_s, FIRST_SIGMA * FIRST_SIGMA)
+        self._tt = min(self._tt + self.walk_density * self.walk_density * elapsed_s, FIRST_SIGMA * FIRST_SIGMA)
 
     def _find_strength(self, force_m_s2: float, elapsed_s: float) -> None:
         self._slow += (1.0 - math.exp(-elapsed_s / WIND_TIME_S)) * (force_m_s2 - self._slow)

@@ -154,7 +154,7 @@ class Pilot:
         """
         self._take_in(samples)
         meter = self._wind_meter
-        text = self._thrust.step(time_s, self._estimate, self.view.in_air)
+        text = self._thrust.step(time_s, self._estimate, self.view.in_air, self._wind)
         if text:
             self.announce(4, text)
         k_thrust = self._thrust.k_thrust_m_s2(self.view.voltage_v)
@@ -184,7 +184,8 @@ class Pilot:
             if setpoint is None:
                 if not self._streamed:
                     self.controller.reset(time_s, told(self.view, time_s))
-                control = self.controller.step(time_s, estimate, self.reference_at, self.view.voltage_v)
+                seen = self._thrust.as_commanded(estimate)
+                control = self.controller.step(time_s, seen, self.reference_at, self.view.voltage_v)
                 setpoint = control.setpoint
                 if control.text:
                     sequencer.announcements.append((4, control.text))

@@ -12,6 +12,8 @@ from uasfly.link.clock import ClockMap
 from uasfly.link.inertial import NAME as INERTIAL
 from uasfly.link.inertial import accelerometer_sample
 from uasfly.link.motion import attitude_target_sample, battery_sample, odometry_sample
+from uasfly.link.rotors import NAME as ROTORS
+from uasfly.link.rotors import RotorAssembler
 from uasfly.link.texts import TextAssembler
 from uasfly.link.truth import GeographicTruth, simulated_truth
 from uasfly.link.vehicle_state import HealthState, VehicleState
@@ -45,10 +47,12 @@ class Decoder:
         self._texts = TextAssembler()
         self._geographic = GeographicTruth()
         self._battery_id = 255
+        self._rotors = RotorAssembler(clock)
         self._handlers: dict[str, Handler] = {
             "ODOMETRY": self._odometry,
             "ATTITUDE_TARGET": self._attitude_target,
             INERTIAL: self._inertial,
+            ROTORS: self._rotors.add,
             "HEARTBEAT": self.state.heartbeat,
             "CURRENT_MODE": lambda fields, _: self.state.current_mode(fields),
             "EXTENDED_SYS_STATE": lambda fields, _: self.state.landed_state(fields),

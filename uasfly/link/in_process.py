@@ -31,6 +31,7 @@ from uasfly.messages import (
     Request,
     RequestKind,
     RequestResult,
+    RotorSample,
     Sample,
     Setpoint,
     TextSample,
@@ -42,6 +43,7 @@ from uasfly.wind_messages import WindEstimate
 ODOMETRY_RATE_HZ = 100.0
 ATTITUDE_TARGET_RATE_HZ = 50.0
 ACCELEROMETER_RATE_HZ = 50.0  # the MAVSDK end takes the mean of the readings of a control cycle
+ROTOR_RATE_HZ = 50.0
 STATE_RATE_HZ = 2.0
 BATTERY_RATE_HZ = 1.0
 HEALTH_RATE_HZ = 5.0
@@ -135,6 +137,10 @@ class DirectVehicle(Protocol):
         """Mean of the accelerometer's last readings, now; None where it says nothing."""
         ...
 
+    def rotors(self) -> RotorSample | None:
+        """Speeds of the rotors, now; None where nobody tells them."""
+        ...
+
     def battery(self) -> BatterySample:
         """Battery, now."""
         ...
@@ -183,6 +189,7 @@ class InProcessLink:
             _Tick(1.0 / ODOMETRY_RATE_HZ, vehicle.odometry),
             _Tick(1.0 / ATTITUDE_TARGET_RATE_HZ, vehicle.attitude_target),
             _Tick(1.0 / ACCELEROMETER_RATE_HZ, vehicle.accelerometer),
+            _Tick(1.0 / ROTOR_RATE_HZ, vehicle.rotors),
             _Tick(1.0 / STATE_RATE_HZ, self._state),
             _Tick(1.0 / BATTERY_RATE_HZ, vehicle.battery),
             _Tick(1.0 / HEALTH_RATE_HZ, vehicle.health),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from uasfly.link.commands import CommandChannel, Ending
 from uasfly.link.inertial import NAME as INERTIAL
 from uasfly.link.modes import CMD_REQUEST_MESSAGE, CMD_SET_MESSAGE_INTERVAL
+from uasfly.link.rotors import NAME as ROTORS
 
 GPS_GLOBAL_ORIGIN_ID = 49
 
@@ -29,6 +30,7 @@ STREAMS = (
     Stream("ESTIMATOR_STATUS", 230, 5.0),
     Stream("BATTERY_STATUS", 147, 2.0),
 )
+ROTOR_STREAM = Stream(ROTORS, 291, 50.0)  # only vehicles whose speed controllers tell their speeds have it
 TRUTH_STREAMS = (
     Stream("DEBUG_FLOAT_ARRAY", 350, 50.0),  # uasfly's simulated vehicle
     Stream("HIL_STATE_QUATERNION", 115, 50.0),  # PX4's SIH
@@ -44,7 +46,8 @@ async def ask_for_streams(commands: CommandChannel, want_truth: bool, narrow: bo
         narrow: the line is a serial one: the inertial unit keeps PX4's own rate (50 Hz), its readings would crowd it.
 
     Returns:
-        Texts about what the vehicle does not send as asked; truth is not among them, no real vehicle has it.
+        Texts about what the vehicle does not send as asked; truth and rotor speeds are not among
+            them, few vehicles have them.
     """
     problems = []
     for stream in STREAMS:
@@ -54,8 +57,8 @@ async def ask_for_streams(commands: CommandChannel, want_truth: bool, narrow: bo
         if not outcome.accepted:
             why = "refuses" if outcome.ending is Ending.ANSWERED else "does not answer"
             problems.append(f"{stream.name} at {stream.rate_hz:g} Hz: the vehicle {why}, its own rate stays")
+    for stream in (ROTOR_STREAM, *(TRUTH_STREAMS if want_truth else ())):
+        await commands.command(CMD_SET_MESSAGE_INTERVAL, (float(stream.message_id), 1e6 / stream.rate_hz), 1)
     if want_truth:
-        for stream in TRUTH_STREAMS:
-            await commands.command(CMD_SET_MESSAGE_INTERVAL, (float(stream.message_id), 1e6 / stream.rate_hz), 1)
         await commands.command(CMD_REQUEST_MESSAGE, (float(GPS_GLOBAL_ORIGIN_ID),), 1)
     return problems

@@ -20,6 +20,7 @@ from uasfly.messages import (
     HealthSample,
     MarkerSample,
     OdometrySample,
+    RotorSample,
     Sample,
     Setpoint,
     StateEstimate,
@@ -28,6 +29,7 @@ from uasfly.messages import (
 from uasfly.observer import states as s
 from uasfly.observer.accelerometer import BiasWatch
 from uasfly.observer.agreement import Agreement
+from uasfly.observer.clock_watch import JUMP_AHEAD_S, ClockWatch
 from uasfly.observer.contact import LIGHT_M_S2, GroundContact
 from uasfly.observer.counters import Counters
 from uasfly.observer.diagnosis import Diagnosis, Journal
@@ -36,6 +38,8 @@ from uasfly.observer.expected import expected_marker
 from uasfly.observer.glide import Glide
 from uasfly.observer.gnss import DriftWatch, Outage
 from uasfly.observer.moment import Moment, Verdict
+from uasfly.observer.moved import MoveWatch
+from uasfly.observer.rotors import RotorThrust
 from uasfly.observer.sightings import MarkerEstimate, SightingLog, marker_estimate
 from uasfly.observer.step import Stepper, hover_thrust_history
 from uasfly.observer.timeline import Timeline
@@ -43,15 +47,12 @@ from uasfly.observer.timeline import Timeline
 OWN_COMMAND_S = 0.5  # for this long after a command of ours in offboard, PX4's attitude target is only its echo
 SILENT_AFTER_S = 0.15  # without odometry for this long estimates are predicted with their uncertainty,
 TICK_BEHIND_S = 0.1  # and the filter itself to this long before now
-JUMP_AHEAD_S = 1.0  # a sample further ahead of the filter than this needs a second one to be believed
 FELT_WITHIN_S = 0.06  # of where the filter stands: an accelerometer's sample further away says nothing
 LONGEST_GAP_S = 5.0  # a longer gap is not bridged: the filter starts again
 EXPECTED_WITHIN_S = 0.5  # of where the filter stands: beyond it nothing is said about where a marker is to be seen
 GLIDE_AFTER_S, GLIDE_FOR_S = 1.0, 5.0  # without a sighting for so long, what the next ones correct is told gradually
-MOVED_AFTER, MOVED_M = 5, 0.15  # so many sightings refused in a row, that far away: the marker has been moved
 THRUST_SHOWS_S = 0.05  # in the velocity, over so long: for what carries the vehicle
 FORCE_SHOWS_S = 0.5  # the force is what thrust left over in about so long
-RESTART_AFTER_S = 1.0  # samples that are all too old for this long: the clock was set back, start again
 
 
 class Observer:
@@ -75,7 +76,9 @@ class Observer:
         self.counters = Counters()
         self.statistics: dict[str, tuple[float, int]] = {}  # sensor: last normalised innovation squared, its dof
         self._thrust = hover_thrust_history(airframe)
-        self._stepper = Stepper(airframe, self._thrust)
+        self._rotors = RotorThrust(airframe, self._thrust)
+        self._turns = airframe.model.hover_rotor_rad_s is not None
+        self._stepper = Stepper(airframe, self._rotors if self._turns else self._thrust)
         for markers in range(1, prepared_markers + 1):
             self._stepper.prepare(markers, in_flight=False)
         self._k_thrust_m_s2 = airframe.model.k_thrust_m_s2
@@ -87,8 +90,7 @@ class Observer:
         self._glide = Glide()
         self._contact = GroundContact()
         self._regained_s = -math.inf
-        self._moved: list[tuple[int, float]] = []
-        self._refused: dict[int, int] = {}
+        self._moves = MoveWatch()
         self.retakes_moved = False
         self._outage = Outage(airframe.observer.velocity_sigma_m_s)
         self._bias = BiasWatch()
@@ -96,8 +98,7 @@ class Observer:
         self._in_air = False
         self._in_air_s = -math.inf
         self._own_command_s = -math.inf
-        self._ahead_s: float | None = None
-        self._dropped_from_s: float | None = None
+        self._clock = ClockWatch()
 
     def add(self, sample: Sample) -> None:
         """Take in a sample, whenever it comes; kinds that say nothing about the state are ignored."""
@@ -111,6 +112,8 @@ class Observer:
                 self._measure(self._outage.usable(odometry) if self._in_air and self._outage.active else odometry)
         elif isinstance(sample, AccelerometerSample):
             self._feel(sample)
+        elif isinstance(sample, RotorSample):
+            self._turn(sample)
         elif isinstance(sample, MarkerSample):
             sighting = checked_sighting(sample)
             if sighting is None:
@@ -137,8 +140,8 @@ class Observer:
         else:
             self.counters.non_finite += 1
 
-    def correct_thrust(self, ratio: float) -> None:
-        """The commands so far gave `ratio` times the thrust that was reckoned with; the force makes up for it.
+    def correct_thrust(self, commands: float, rotors: float = 1.0) -> None:
+        """Commands and rotors so far gave so many times the thrust reckoned with; the force makes up for what acts.
 
         Thrust and force together, and with them motion and attitude, stay what they were: nothing is learnt again.
         Commands to come go by `set_k_thrust`, as ever.
@@ -146,10 +149,22 @@ class Observer:
         timeline = self._timeline
         if timeline is not None:
             now_s = timeline.newest.time_s
-            more = (ratio - 1.0) * self._thrust.mean(now_s - FORCE_SHOWS_S, now_s)
+            ratio = rotors if self._rotors.fresh(now_s) else commands
+            more = (ratio - 1.0) * self._rotors.mean(now_s - FORCE_SHOWS_S, now_s)
             up_in_world = rotation_matrix(timeline.newest.packed[s.QUATERNION])[:, 2]
             timeline.shift_force(-more * up_in_world)
-        self._thrust.rescale(ratio)
+        self._rotors.rescale(commands, rotors)
+
+    @property
+    def rotor_ratio(self) -> float | None:
+        """Thrust by rotor speeds over thrust by commands, over seconds; None where the filter flies by commands."""
+        timeline = self._timeline
+        return self._rotors.ratio if timeline is not None and self._rotors.fresh(timeline.newest.time_s) else None
+
+    @property
+    def rotor_excess_m_s2(self) -> float:
+        """By how much the thrust is just now more than commanded, by the rotors; nil where that is not known."""
+        return 0.0 if self.rotor_ratio is None else self._rotors.excess_m_s2
 
     def estimate(self, time_s: float) -> StateEstimate | None:
         """State at `time_s`; the sigmas are those of the newest measurement, or of `time_s` after SILENT_AFTER_S.
@@ -230,8 +245,7 @@ class Observer:
 
     def take_moved(self) -> list[tuple[int, float]]:
         """Markers that have been moved since the last call, and how far [m] each was away from its place."""
-        moved, self._moved = self._moved, []
-        return moved
+        return self._moves.take()
 
     @property
     def moment(self) -> Moment | None:
@@ -288,17 +302,20 @@ class Observer:
             self._start(measured)
             return
         time_s, newest_s = measured.time_s, timeline.newest.time_s
-        if time_s > newest_s + JUMP_AHEAD_S and not self._is_confirmed(measured):
+        if time_s > newest_s + JUMP_AHEAD_S and not self._clock.believes(time_s):
+            self.counters.ahead += 1
             return
-        self._ahead_s = None
+        self._clock.not_ahead()
         if time_s - newest_s > LONGEST_GAP_S:
             self._restart(measured)
         elif time_s < timeline.oldest.time_s:
-            self._drop(measured)
+            self.counters.dropped += 1
+            if self._clock.was_set_back(time_s):
+                self._restart(measured)
         elif timeline.holds(measured):
             self.counters.duplicates += 1
         else:
-            self._dropped_from_s = None
+            self._clock.in_order()
             if isinstance(measured, Sighting):
                 self._sight(timeline, measured)
             elif time_s >= newest_s:
@@ -336,6 +353,13 @@ class Observer:
             self.statistics[verdict.sensor] = (verdict.nis, verdict.dof)
             self.counters.rejected[verdict.sensor] += not verdict.accepted
 
+    def _turn(self, sample: RotorSample) -> None:
+        """A sample of the rotors: thrust of steps to come, where it belongs to the filter's time."""
+        timeline = self._timeline
+        if timeline is not None and self._turns:
+            near = abs(timeline.newest.time_s - sample.time_s) < EXPECTED_WITHIN_S
+            self.counters.non_finite += not (near and self._rotors.add(sample, self._flies))
+
     def _sight(self, timeline: Timeline, sighting: Sighting) -> None:
         """A sighting, mostly late; the first after a while may move the filter, and what is told then glides there."""
         before = timeline.newest
@@ -351,37 +375,13 @@ class Observer:
         if sighting.time_s - self._regained_s < GLIDE_FOR_S:
             was = self._stepper.extrapolated(before, after.time_s)[s.POSITION]
             self._glide.stepped(after.time_s, after.packed[s.POSITION] - was)
-        if self.retakes_moved and verdicts:
-            self._look_for_move(sighting.marker_id, verdicts[0])
-
-    def _look_for_move(self, marker_id: int, verdict: Verdict) -> None:
-        refused = 0 if verdict.accepted or verdict.away_m < MOVED_M else self._refused.get(marker_id, 0) + 1
-        self._refused[marker_id] = refused
-        if refused >= MOVED_AFTER:
-            self._refused[marker_id] = 0
-            self._moved.append((marker_id, verdict.away_m))
-            self.forget(marker_id)
-
-    def _is_confirmed(self, measured: Odometry | Sighting) -> bool:
-        """Whether a sample far ahead is believed: one alone is a wrong time stamp, a second soon after confirms it."""
-        if self._ahead_s is not None and 0.0 < measured.time_s - self._ahead_s < JUMP_AHEAD_S:
-            return True
-        self._ahead_s = measured.time_s
-        self.counters.ahead += 1
-        return False
-
-    def _drop(self, measured: Odometry | Sighting) -> None:
-        """A sample older than the buffer; when nothing else comes for a while, the clock was set back."""
-        self.counters.dropped += 1
-        if self._dropped_from_s is None or measured.time_s < self._dropped_from_s:
-            self._dropped_from_s = measured.time_s
-        elif measured.time_s - self._dropped_from_s > RESTART_AFTER_S:
-            self._restart(measured)
+        if self.retakes_moved and verdicts and self._moves.look(sighting.marker_id, verdicts[0]):
+            self.forget(sighting.marker_id)
 
     def _start(self, measured: Odometry | Sighting) -> None:
         if isinstance(measured, Odometry) and measured.complete:
             self._timeline = Timeline(self._stepper, self._stepper.start(measured, self._flies))
-            self._ahead_s = self._dropped_from_s = None
+            self._clock.in_order()
 
     def _restart(self, measured: Odometry | Sighting) -> None:
         if isinstance(measured, Odometry) and measured.complete:

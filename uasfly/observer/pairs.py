@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from uasfly.messages import Array, OdometrySample, Sample
+from uasfly.messages import Array, OdometrySample, RotorSample, Sample
 
 LONGEST_SPAN_S = 0.015  # between the two
 
@@ -19,11 +19,15 @@ def paired(samples: Sequence[Sample]) -> Sequence[Sample]:
     """The samples in their order, neighbours among the odometry as one, where the second one came.
 
     Samples further apart, with something in them that is not finite, or with a jump of PX4's estimator between them,
-    stay as they are.
+    stay as they are. Rotor speeds come first: they tell the thrust that led to where the odometry is.
     """
+    rotors: list[Sample] = []
     result: list[Sample] = []
     earlier: OdometrySample | None = None  # in the result, without a partner yet
     for sample in samples:
+        if isinstance(sample, RotorSample):
+            rotors.append(sample)
+            continue
         if not isinstance(sample, OdometrySample):
             result.append(sample)
             continue
@@ -35,7 +39,7 @@ def paired(samples: Sequence[Sample]) -> Sequence[Sample]:
             result = [kept for kept in result if kept is not earlier]
             result.append(mean)
             earlier = None
-    return result
+    return [*rotors, *result] if rotors else result
 
 
 def _mean(first: OdometrySample, second: OdometrySample) -> OdometrySample | None:

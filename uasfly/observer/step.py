@@ -20,6 +20,7 @@ from uasfly.observer.door import Measurement, Odometry, Sighting, SpecificForce
 from uasfly.observer.gusts import AS_CONFIGURED, Gusts
 from uasfly.observer.markers import MarkerAlgebra
 from uasfly.observer.moment import Moment, Verdict
+from uasfly.observer.rotors import RotorThrust
 from uasfly.observer.thrust import ThrustHistory
 from uasfly.observer.update import SIGMA_FACTOR_MIN
 
@@ -49,7 +50,7 @@ class Stepper:
         thrust: which thrust acts when.
     """
 
-    def __init__(self, airframe: Airframe, thrust: ThrustHistory) -> None:
+    def __init__(self, airframe: Airframe, thrust: ThrustHistory | RotorThrust) -> None:
         noise = airframe.observer
         self._thrust = thrust
         self._noise = noise

@@ -12,7 +12,7 @@ import numpy as np
 
 from uasfly.errors import UasflyError
 from uasfly.frames import quaternion_from_rotation_vector, quaternion_product
-from uasfly.messages import AccelerometerSample, FlightMode, OdometrySample
+from uasfly.messages import AccelerometerSample, Array, FlightMode, OdometrySample, RotorSample
 from uasfly.sim import faults as f
 from uasfly.sim.link_faults import LinkFaults
 
@@ -60,6 +60,8 @@ class FaultBoard:
         self._drifts: list[f.GnssDrift] = []
         self._gusts: list[tuple[f.Wind, float, float]] = []  # with begin and end
         self._accelerometer: list[f.Accelerometer] = []
+        self._rotor_speeds: list[f.RotorSpeeds] = []
+        self._frozen: Array | None = None  # the speeds that are told again and again
         self._distortions: list[f.VelocitySpike | f.AttitudeSpike | f.OdometryNan] = []
         self._refuses = [0, 0]
         self._now_s = 0.0
@@ -136,6 +138,9 @@ class FaultBoard:
             case f.Accelerometer():
                 self._accelerometer.append(fault)
                 return partial(self._accelerometer.remove, fault)
+            case f.RotorSpeeds():
+                self._rotor_speeds.append(fault)
+                return partial(self._rotor_speeds.remove, fault)
             case f.RefuseArming() | f.RefuseOffboard():
                 index = int(isinstance(fault, f.RefuseOffboard))
                 self._refuse(index, 1)
@@ -176,6 +181,17 @@ class FaultBoard:
         if said == "nothing":
             return None
         return AccelerometerSample(sample.time_s, np.full(3, math.nan if said == "nan" else _HUGE_M_S2))
+
+    def rotors(self, sample: RotorSample) -> RotorSample | None:
+        """What the telemetry gives of the rotors' speeds, if anything."""
+        said = self._rotor_speeds[-1].says if self._rotor_speeds else ""
+        if said != "frozen" or self._frozen is None:
+            self._frozen = sample.speeds_rad_s
+        if said == "nothing":
+            return None
+        if said == "zero":
+            return RotorSample(sample.time_s, np.concatenate((np.zeros(1), sample.speeds_rad_s[1:])))
+        return RotorSample(sample.time_s, self._frozen)
 
     def _shift(self, step: tuple[float, ...]) -> None:
         self._offset = [old + s for old, s in zip(self._offset, step, strict=True)]

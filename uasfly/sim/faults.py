@@ -88,6 +88,13 @@ class Accelerometer(Lasting):
     says: Literal["nothing", "nan", "huge"]
 
 
+class RotorSpeeds(Lasting):
+    """The speed controllers say nothing, the same speeds again and again, or that the first rotor stands."""
+
+    kind: Literal["rotor_speeds"]
+    says: Literal["nothing", "frozen", "zero"]
+
+
 class BatteryCharge(FaultBase):
     """The battery has so much charge left."""
 
@@ -209,6 +216,7 @@ Fault = Annotated[
     | AttitudeSpike
     | OdometryNan
     | Accelerometer
+    | RotorSpeeds
     | BatteryCharge
     | Motor
     | Wind

@@ -85,6 +85,8 @@ class Sensors(FileModel):
     vibration_m_s2: Annotated[
         NonNegative, Field(description="shaking by the rotors in hover, sigma in a single reading, on each axis")
     ] = 0.5
+    rotor_speeds: Annotated[bool, Field(description="whether the speed controllers tell the rotors' speeds")] = False
+    rotor_noise_rad_s: Annotated[NonNegative, Field(description="white, on the speed of each rotor")] = 1.0
     delays: Delays = Delays()
 
     @model_validator(mode="after")

@@ -1,6 +1,7 @@
-"""Raw sensors of the simulated vehicle: inertial unit, magnetometer, barometer, GNSS receiver; world ENU, body FLU.
+"""Raw sensors of the simulated vehicle: inertial unit, magnetometer, barometer, GNSS receiver, speeds of the rotors.
 
-White noise as PX4's simulator adds it, biases that stay for the flight, the rotors' vibration as flight logs have it.
+World ENU, body FLU. White noise as PX4's simulator adds it, biases that stay for the flight, the rotors' vibration as
+flight logs have it.
 Nothing in the vehicle flies by these; a ground station looks at them, and uasfly may use the accelerometer.
 """
 
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uasfly.frames import rotation_matrix
-from uasfly.messages import AccelerometerSample, Array
+from uasfly.messages import AccelerometerSample, Array, RotorSample
 from uasfly.sim.body import GRAVITY_M_S2
 from uasfly.sim.estimate import Estimate
 from uasfly.sim.noise_rows import NoiseRows
@@ -33,6 +34,8 @@ _BAROMETER_BIAS_M = 0.3
 _GNSS_NOISE_M = 0.2
 _GNSS_HEIGHT_NOISE_M = 0.5
 _GNSS_VELOCITY_NOISE_M_S = 0.06
+_ROTOR_SPEED = slice(13, None)  # in the plant's state
+_RPM = 60.0 / (2.0 * math.pi)  # of 1 rad/s; whole ones are told
 _SHAKING = slice(16, 19)
 _WIDTH = 19
 _READINGS = 4  # in one sample of the accelerometer, as the link takes their mean
@@ -93,6 +96,7 @@ class RawSensors:
         estimate: has GNSS or not, and its slow errors.
         settings: noise, bias and vibration of the accelerometer.
         hover_speed_rad_s: of a rotor; the vibration grows with the square of the speed, as imbalance does.
+        rotor_rng: source of the noise of the rotors' speeds.
     """
 
     def __init__(
@@ -103,6 +107,7 @@ class RawSensors:
         estimate: Estimate,
         settings: Sensors,
         hover_speed_rad_s: float,
+        rotor_rng: np.random.Generator,
     ) -> None:
         self._settings = settings
         self._hover_speed_rad_s = hover_speed_rad_s
@@ -114,12 +119,14 @@ class RawSensors:
         self._barometer_bias = _BAROMETER_BIAS_M * rng.standard_normal()
         self._noise = NoiseRows(rng, _WIDTH)
         self._row_before = self._noise.row
-        self._steps_behind = 0
+        self._rotor_noise = NoiseRows(rotor_rng, max(1, len(plant_state) - _ROTOR_SPEED.start))
+        self._steps_behind = self._rotor_steps_behind = 0
         self._last_fix = geographic_position((plant_state[0], plant_state[1], plant_state[2]))
 
     def advance(self) -> None:
         """Go to the noise of the next step; it is drawn only when somebody reads."""
         self._steps_behind += 1
+        self._rotor_steps_behind += 1
 
     def inertial(self, time_s: float) -> InertialSample:
         """What inertial unit, magnetometer and barometer read now."""
@@ -160,6 +167,20 @@ class RawSensors:
         speeds = self._state[13:]
         turning = sum(speed * speed for speed in speeds) / max(1, len(speeds))
         return self._settings.vibration_m_s2 * turning / self._hover_speed_rad_s**2
+
+    def rotors(self, time_s: float) -> RotorSample | None:
+        """Speeds of the rotors in whole rpm, none below zero; None where nobody tells them."""
+        if not self._settings.rotor_speeds:
+            return None
+        while self._rotor_steps_behind:
+            self._rotor_noise.advance()
+            self._rotor_steps_behind -= 1
+        sigma = self._settings.rotor_noise_rad_s
+        told = [
+            round(_RPM * max(0.0, speed + sigma * noise)) / _RPM if speed > sigma else 0.0
+            for speed, noise in zip(self._state[_ROTOR_SPEED], self._rotor_noise.row, strict=True)
+        ]
+        return RotorSample(time_s, np.array(told))
 
     def gnss(self, time_s: float) -> GnssSample:
         """What the GNSS receiver reads now."""

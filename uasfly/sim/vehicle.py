@@ -22,6 +22,7 @@ from uasfly.messages import (
     FlightMode,
     HealthSample,
     OdometrySample,
+    RotorSample,
     TextSample,
     TruthSample,
     VehicleSample,
@@ -107,6 +108,7 @@ class SimulatedVehicle:
             self._estimate,
             self._scenario.sensors,
             self._plant.hover_speed_rad_s,
+            np.random.default_rng(sensor_seed.spawn(1)[0]),
         )
         self._autopilot = Autopilot(
             self._plant.rotors,
@@ -307,6 +309,11 @@ class SimulatedVehicle:
     def accelerometer(self) -> AccelerometerSample | None:
         """Mean of the accelerometer's last readings; None while a fault keeps it silent."""
         return self._faults.accelerometer(self._sensors.accelerometer(self.time_s))
+
+    def rotors(self) -> RotorSample | None:
+        """Speeds of the rotors; None where the scenario's speed controllers do not tell them."""
+        sample = self._sensors.rotors(self.time_s)
+        return None if sample is None else self._faults.rotors(sample)
 
     def inertial(self) -> InertialSample | None:
         """Accelerometer, gyro, magnetometer and barometer; None while a fault keeps them silent."""

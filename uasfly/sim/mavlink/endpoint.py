@@ -111,7 +111,8 @@ class Endpoint:
 
     def _build(self, message_id: int) -> Message | None:
         stream = self._scheduler.stream(message_id)
-        return None if stream is None else stream.build(self.view)
+        built = None if stream is None else stream.build(self.view)
+        return built[0] if isinstance(built, tuple) else built
 
     def _heartbeat(self, _message: Message, sender: Sender) -> list[Message]:
         if sender in self.companions or len(self.companions) < MAX_COMPANIONS:

@@ -19,6 +19,20 @@ _SIGNED = 0x01
 MAX_BAD_FRAMES = 16  # a datagram of nothing but start bytes must not cost a checksum a byte
 
 
+class UnlistedMessage(dialect.MAVLink_message):  # type: ignore[misc]
+    """A message that PX4 sends and pymavlink leaves out of its dialects."""
+
+    def __init__(self, message_id: int, name: str, crc_extra: int, payload: bytes) -> None:
+        super().__init__(message_id, name)
+        self._extra = crc_extra
+        self._content = payload
+
+    def pack(self, mav: Message, force_mavlink1: bool = False) -> bytes:
+        """The frame, as pymavlink packs its own messages."""
+        packed: bytes = self._pack(mav, self._extra, self._content, force_mavlink1=force_mavlink1)
+        return packed
+
+
 class FrameReader:
     """Takes messages out of datagrams.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import development as dialect
 
-from uasfly.sim.mavlink.framing import Message
+from uasfly.sim.mavlink.framing import Message, UnlistedMessage
 
 COMPONENT_AUTOPILOT = 1
 # version that the recording was made with: 1.18.0, development build; clients choose features by it
@@ -63,17 +63,4 @@ class Identity:
     def protocol_version(self) -> Message:
         """PROTOCOL_VERSION: MAVLink 2, 1 understood."""
         payload = struct.pack("<3H16x", 200, 100, 203)
-        return _UnlistedMessage(PROTOCOL_VERSION_ID, "PROTOCOL_VERSION", _PROTOCOL_VERSION_CRC_EXTRA, payload)
-
-
-class _UnlistedMessage(dialect.MAVLink_message):  # type: ignore[misc]
-    """A message that PX4 sends and pymavlink leaves out of its dialects."""
-
-    def __init__(self, message_id: int, name: str, crc_extra: int, payload: bytes) -> None:
-        super().__init__(message_id, name)
-        self._extra = crc_extra
-        self._content = payload
-
-    def pack(self, mav: Message, force_mavlink1: bool = False) -> bytes:
-        packed: bytes = self._pack(mav, self._extra, self._content, force_mavlink1=force_mavlink1)
-        return packed
+        return UnlistedMessage(PROTOCOL_VERSION_ID, "PROTOCOL_VERSION", _PROTOCOL_VERSION_CRC_EXTRA, payload)

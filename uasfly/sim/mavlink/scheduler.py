@@ -21,13 +21,14 @@ class Stream:
     Attributes:
         message_id: MAVLink's number of the message.
         rate_hz: default rate, 0 for one that is off until it is asked for.
-        build: makes the message; None where there is nothing new to send, which leaves the stream due.
+        build: makes the message, or those that go together; None where there is nothing new to send, which
+            leaves the stream due.
         max_rate_hz: rate above which a request is cut.
     """
 
     message_id: int
     rate_hz: float
-    build: Callable[[VehicleView], Message | None]
+    build: Callable[[VehicleView], Message | tuple[Message, ...] | None]
     max_rate_hz: float
 
 
@@ -77,13 +78,15 @@ class Scheduler:
         time_s = view.time_s
         if time_s < self.next_due_s - _TOLERANCE_S:
             return []
-        messages = []
+        messages: list[Message] = []
         next_due_s = _NEVER
         for timer in self._running:
             if timer.due_s <= time_s + _TOLERANCE_S:
                 message = timer.stream.build(view)
                 timer.count_as_sent(time_s, message is not None)
-                if message is not None:
+                if isinstance(message, tuple):
+                    messages.extend(message)
+                elif message is not None:
                     messages.append(message)
             next_due_s = min(next_due_s, timer.due_s)
         self.next_due_s = next_due_s

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import struct
 
 from pymavlink.dialects.v20 import development as dialect
 
 from uasfly.frames import swap_enu_ned, swap_flu_frd
-from uasfly.sim.mavlink.framing import Message
+from uasfly.sim.mavlink.framing import Message, UnlistedMessage
 from uasfly.sim.mavlink.motion_messages import int32, microseconds, milliseconds
 from uasfly.sim.mavlink.vehicle_view import VehicleView
 from uasfly.sim.sensors import GnssSample
@@ -18,6 +19,11 @@ GNSS_LOST_INTERVAL_S = 1.0
 _FIELDS_UPDATED = 0x3F | 0x1C0 | 0x1A00
 _LARGEST_U32 = 0xFFFFFFFF
 _UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
+ESC_STATUS_ID, _ESC_STATUS_CRC_EXTRA = 291, 10
+_ESC_STATUS = struct.Struct("<Q4i8fB")  # time [us], speeds [rpm], voltages [V] and currents [A], index of the first
+_ESC_BATCH = 4  # rotors in one ESC_STATUS
+_UNTOLD = (0.0,) * 8  # voltages and currents
+_RPM = 60.0 / (2.0 * math.pi)  # of 1 rad/s
 _EPH, _EPV = 70, 110  # dilution of precision times 100, and
 _VELOCITY_ACCURACY_MM_S = 400  # accuracy of PX4's simulated receiver
 
@@ -49,6 +55,24 @@ def scaled_pressure(view: VehicleView) -> Message | None:
     pressure = pressure_of_altitude_hpa(sample.pressure_altitude_m)
     return dialect.MAVLink_scaled_pressure_message(
         milliseconds(sample.time_s), pressure, 0.0, round(TEMPERATURE_C * 100.0), 0
+    )
+
+
+def esc_status(view: VehicleView) -> tuple[Message, ...] | None:
+    """ESC_STATUS, four rotors a message; None where the speed controllers tell nothing. PX4 fills up with zeros."""
+    sample = view.vehicle.rotors()
+    if sample is None:
+        return None
+    rpm = [round(speed * _RPM) for speed in sample.speeds_rad_s.tolist()]
+    rpm += [0] * (-len(rpm) % _ESC_BATCH)
+    return tuple(
+        UnlistedMessage(
+            ESC_STATUS_ID,
+            "ESC_STATUS",
+            _ESC_STATUS_CRC_EXTRA,
+            _ESC_STATUS.pack(microseconds(sample.time_s), *rpm[index : index + _ESC_BATCH], *_UNTOLD, index),
+        )
+        for index in range(0, len(rpm), _ESC_BATCH)
     )
 
 

@@ -1,10 +1,11 @@
 """Which messages the vehicle sends by itself on the onboard link, and how often: read from the recording of PX4.
 
-PX4 streams further messages there that this vehicle leaves out: DISTANCE_SENSOR, ESC_INFO, ESC_STATUS,
+PX4 streams further messages there that this vehicle leaves out: DISTANCE_SENSOR, ESC_INFO,
 SERVO_OUTPUT_RAW, GNSS_INTEGRITY and OPEN_DRONE_ID_* (it has none of these devices), POSITION_TARGET_GLOBAL_INT (it does
 not tell the targets of its own modes), ESTIMATOR_SENSOR_FUSION_STATUS, LINK_NODE_STATUS, TIME_ESTIMATE_TO_TARGET, EVENT
 and CURRENT_EVENT_SEQUENCE (not in pymavlink's dialects; texts go out as STATUSTEXT, which PX4 sends to ground stations
 only).
+ESC_STATUS comes when it is asked for and the scenario says `sensors.rotor_speeds`.
 As PX4 does for messages that it knows and has no data for, their intervals can be set and they stay silent.
 """
 
@@ -21,7 +22,7 @@ from uasfly.sim.mavlink import status_messages as status
 from uasfly.sim.mavlink.framing import Message
 from uasfly.sim.mavlink.identity import PROTOCOL_VERSION_ID, Identity
 from uasfly.sim.mavlink.scheduler import Stream
-from uasfly.sim.mavlink.sensor_messages import Gnss, highres_imu, scaled_pressure
+from uasfly.sim.mavlink.sensor_messages import ESC_STATUS_ID, Gnss, esc_status, highres_imu, scaled_pressure
 from uasfly.sim.mavlink.vehicle_view import VehicleView
 
 LOOP_HZ = 250.0  # attitude and sensors: PX4's control loop
@@ -29,13 +30,14 @@ ESTIMATOR_HZ = 100.0  # PX4's estimator
 GNSS_HZ = 8.0
 STATUS_HZ = 2.0  # PX4's commander says its state twice a second and whenever it changes
 TRUTH_HZ = 100.0
+ROTOR_HZ = 50.0
 PROCESSOR_HZ = 5.0
 
 # Further streams of PX4 (main of August 2026): an interval for them is accepted, and nothing comes.
 # fmt: off
 SILENT_IDS = (
     8, 25, 26, 36, 62, 65, 69, 76, 87, 93, 106, 112, 115, 116, 124, 129, 132, 137, 143, 149, 192, 225, 231, 235,
-    246, 250, 251, 253, 254, 261, 263, 264, 265, 280, 281, 283, 284, 285, 286, 290, 291, 292, 296, 330, 339, 340,
+    246, 250, 251, 253, 254, 261, 263, 264, 265, 280, 281, 283, 284, 285, 286, 290, 292, 296, 330, 339, 340,
     360, 361, 371, 372, 375, 380, 395, 397, 435, 441, 514, 10001, 10002, 12900, 12901, 12904, 12918, 12920,
 )
 # fmt: on
@@ -73,7 +75,7 @@ def streams(identity: Identity, now_s: Callable[[], float], unix_s: Callable[[],
     def timesync(_view: VehicleView) -> Message:
         return dialect.MAVLink_timesync_message(0, int(now_s() * 1e9))
 
-    table: list[tuple[int, float, Callable[[VehicleView], Message | None], float]] = [
+    table: list[tuple[int, float, Callable[[VehicleView], Message | tuple[Message, ...] | None], float]] = [
         # message, default rate [Hz] (0: only when asked for), builder, highest rate [Hz]
         (dialect.MAVLINK_MSG_ID_TIMESYNC, 10.0, timesync, LOOP_HZ),
         (dialect.MAVLINK_MSG_ID_HIGHRES_IMU, 50.0, highres_imu, LOOP_HZ),
@@ -102,6 +104,7 @@ def streams(identity: Identity, now_s: Callable[[], float], unix_s: Callable[[],
         (dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, 0.0, motion.global_origin, 1.0),
         (dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0.0, lambda _: identity.autopilot_version(), 1.0),
         (PROTOCOL_VERSION_ID, 0.0, lambda _: identity.protocol_version(), 1.0),
+        (ESC_STATUS_ID, 0.0, esc_status, ROTOR_HZ),
         (dialect.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 0.0, motion.truth, TRUTH_HZ),
     ]
     return [Stream(*row) for row in table] + [Stream(number, 0.0, lambda _: None, 1.0) for number in SILENT_IDS]

@@ -12,6 +12,7 @@ from uasfly.messages import (
     FlightMode,
     HealthSample,
     OdometrySample,
+    RotorSample,
     TextSample,
     TruthSample,
     VehicleSample,
@@ -100,6 +101,10 @@ class Vehicle(Protocol):
 
     def inertial(self) -> InertialSample | None:
         """Accelerometer, gyro, magnetometer and barometer; None where they say nothing."""
+        ...
+
+    def rotors(self) -> RotorSample | None:
+        """Speeds of the rotors; None where nobody tells them."""
         ...
 
     def gnss(self) -> GnssSample:
