@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from uasfly.airframe import GRAVITY_M_S2, Airframe
+from uasfly.airframe import Airframe
 from uasfly.messages import Array
 from uasfly.observer import functions
 from uasfly.observer import states as s
@@ -341,11 +341,6 @@ def correlation_factor(interval_s: float, correlation_s: float) -> float:
     taking them for noise would only blind the filter to the wind. For those leave the correlation at 0.
     """
     return 1.0 / math.tanh(0.5 * interval_s / correlation_s) if correlation_s > 0.0 else 1.0
-
-
-def hover_thrust_history(airframe: Airframe) -> ThrustHistory:
-    """Empty thrust history of an airframe: before the first command it hovers."""
-    return ThrustHistory(airframe.model.thrust_acts_after_s, GRAVITY_M_S2)
 
 
 def _without_force(moment: Moment) -> Array:
