@@ -142,7 +142,9 @@ def odometry_step(markers: int) -> ca.Function:
 def accelerometer_step(markers: int) -> ca.Function:
     """(packed state, inputs (ACCELEROMETER_INPUTS)) -> (packed state after prediction and update, outputs).
 
-    The GNSS bias and the velocity's wander stay as they are (see `_held`): the accelerometer says nothing of them.
+    The GNSS bias and the velocity's wander stay as they are (see `_held`): the accelerometer says nothing of them. The
+    attitude stays too: the edge of a gust is many sigmas of the force at once, and what the covariance makes of that
+    for the attitude is false (it turned as far as the attitude's own gate).
     """
     layout = s.Layout(markers)
     packed, inputs = ca.SX.sym("packed", layout.size), ca.SX.sym("inputs", s.ACCELEROMETER_INPUTS)
@@ -157,7 +159,8 @@ def accelerometer_step(markers: int) -> ca.Function:
     shortened = ca.sqrt(up.GATE_3 / ca.fmax(nis, up.GATE_3)) * residual
     sample = up.matched_covariance(noise, noise, inverse, shortened, ca.SX(1.0))
     held = ca.SX.eye(layout.errors)
-    held[s.D_BIAS, s.D_BIAS] = held[s.D_VELOCITY_WANDER, s.D_VELOCITY_WANDER] = ca.SX(3, 3)
+    for still in (s.D_ATTITUDE, s.D_BIAS, s.D_VELOCITY_WANDER, s.D_ATTITUDE_WANDER):
+        held[still, still] = ca.SX(3, 3)
     gain, covariance = up.joseph_update(covariance, jacobian, noise, passed * ca.sparsify(held))
     nominal, covariance = _inject(nominal, covariance, ca.mtimes(gain, residual))
     result = ca.vertcat(nominal, ca.vec(covariance), packed[layout.matched.start :])
