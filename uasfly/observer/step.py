@@ -91,13 +91,9 @@ class Stepper:
             in_flight: takes some tenths of a second; otherwise they are compiled, which may take some seconds.
         """
         if markers not in self._predictions:
-            generated = functions.prediction(markers), functions.odometry_step(markers)
-            predict, update = generated if in_flight else functions.compiled_steps(markers)
-            self._predictions[markers] = functions.Caller(predict)
-            self._odometry_steps[markers] = functions.Caller(update)
-            if self._noise.accelerometer_sigma_m_s2 is not None:
-                step = functions.accelerometer_step if in_flight else functions.compiled_accelerometer_step
-                self._accelerometer_steps[markers] = functions.Caller(step(markers))
+            generated = functions.steps(markers) if in_flight else functions.compiled_steps(markers)
+            calls = [functions.Caller(step) for step in generated]
+            self._predictions[markers], self._odometry_steps[markers], self._accelerometer_steps[markers] = calls
 
     def start(self, odometry: Odometry, airborne: bool) -> Moment:
         """The first moment, from a complete odometry sample: force, GNSS bias and wanders zero.
