@@ -26,7 +26,6 @@ from uasfly.errors import UasflyError
 
 # Not -ffast-math: the checks for NaN would be optimised away. Not -march=native: a home may be shared between machines.
 FLAGS = ("-O2", "-std=c99", "-fPIC", "-shared", "-fno-math-errno")
-GENERATED_FLAGS = ("-O1", *FLAGS[1:])  # straight-line code of thousands of lines: as fast, compiled in half the time
 COMPILE_TIMEOUT_S = 180.0
 
 Library = TypeVar("Library")
@@ -68,7 +67,7 @@ def compile_functions(
         except RuntimeError as error:
             raise OSError(str(error).splitlines()[0]) from error
 
-    return load_library(generator.dump(), name, load, GENERATED_FLAGS, compiler, folder)
+    return load_library(generator.dump(), name, load, FLAGS, compiler, folder)
 
 
 def find_compiler() -> list[str]:

@@ -7,9 +7,11 @@ from tests.observer.manifold import minus_pose, plus_core, plus_pose, random_pos
 from tests.observer.test_functions import covariance_of, packed_state
 from uasfly.frames import quaternion_inverse, quaternion_product, rotation_matrix
 from uasfly.messages import Array
+from uasfly.observer import functions
 from uasfly.observer import states as s
 from uasfly.observer.door import Sighting
-from uasfly.observer.markers import SCALE_MAX, MarkerAlgebra
+from uasfly.observer.markers import MarkerAlgebra
+from uasfly.observer.sighting_gate import SCALE_MAX
 
 COVARIANCE = np.diag((0.01**2,) * 3 + (0.02**2,) * 3)
 
@@ -25,6 +27,13 @@ def located_from(core: Array, seen: Array) -> Array:
     """Pose (7,) in the world of a marker seen from the body, by numpy."""
     position = core[s.POSITION] + rotation_matrix(core[s.QUATERNION]) @ seen[:3]
     return np.concatenate((position, quaternion_product(core[s.QUATERNION], seen[3:])))
+
+
+def algebra_of(markers: int) -> MarkerAlgebra:
+    """The algebra of so many markers."""
+    algebra = MarkerAlgebra()
+    algebra.prepare(functions.steps(markers))
+    return algebra
 
 
 @pytest.mark.parametrize("markers", [0, 1])
@@ -66,7 +75,7 @@ def test_a_second_sighting_corrects_vehicle_and_marker_as_the_textbook_does() ->
     core, marker = packed[: s.CORE_NOMINAL], packed[s.marker_nominal(1)]
     expected_view = seen_from(core, marker)
     sighting = Sighting(0.0, 7, plus_pose(expected_view, 0.01 * rng.standard_normal(6)), COVARIANCE)
-    result = MarkerAlgebra().sighting(packed, 2, 1, sighting, 1.0, 0.0)
+    result = algebra_of(2).sighting(packed, 2, 1, sighting, 1.0, 0.0)
     H = np.zeros((6, layout.errors))
     for k in range(s.CORE_ERROR):
         step = 1e-6 * np.eye(s.CORE_ERROR)[k]
@@ -100,7 +109,7 @@ def test_a_sighting_outside_its_gate_is_refused_and_let_in_as_it_repeats() -> No
     packed[s.Layout(1).covariance] *= 1e-3  # all doubt is in the sighting
     view = seen_from(packed[: s.CORE_NOMINAL], packed[s.marker_nominal(0)])
     sighting = Sighting(0.0, 7, plus_pose(view, np.array((3.0, 0.0, 0.0, 0.0, 0.0, 0.0))), COVARIANCE)
-    algebra, scale, refused = MarkerAlgebra(), 1.0, 0
+    algebra, scale, refused = algebra_of(1), 1.0, 0
     result = algebra.sighting(packed, 1, 0, sighting, scale, 0.1)
     while not result.accepted:
         np.testing.assert_array_equal(result.packed, packed)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 
@@ -18,7 +18,7 @@ from uasfly import native
 from uasfly.messages import Array
 from uasfly.observer import error_state as es
 from uasfly.observer import measurements as me
-from uasfly.observer import odometry
+from uasfly.observer import odometry, sighting_gate
 from uasfly.observer import states as s
 from uasfly.observer import update as up
 from uasfly.observer.matrices import Matrix, by_numbers
@@ -187,27 +187,54 @@ def _inject(nominal: ca.MX, covariance: ca.MX, error: ca.MX, markers: int) -> tu
 
 
 @lru_cache(maxsize=8)
-def injection(markers: int) -> ca.Function:
-    """(nominal state, covariance, error) -> (nominal state with the error added, covariance of what is left)."""
-    layout = s.Layout(markers)
-    nominal, error = ca.MX.sym("nominal", layout.nominal_size), ca.MX.sym("error", layout.errors)
-    covariance = ca.MX.sym("covariance", layout.errors, layout.errors)
-    return _function(
-        f"injection_{markers}", [nominal, covariance, error], [*_inject(nominal, covariance, error, markers)]
+def sighting_step(markers: int, index: int) -> ca.Function:
+    """(packed state, inputs (SIGHTING_INPUTS)) -> (packed state after a sighting of marker `index`, outputs)."""
+    layout, seen = s.Layout(markers), s.marker_error(index)
+    packed, inputs = ca.MX.sym("packed", layout.size), ca.MX.sym("inputs", s.SIGHTING_INPUTS)
+    nominal, covariance = _unpack(packed, layout)
+    innovation, by_core, by_marker = _geometry()(
+        nominal[: s.CORE_NOMINAL], nominal[s.marker_nominal(index)], inputs[s.IN_SIGHTING]
     )
+    others = ca.MX(6, seen.start - s.CORE_ERROR), ca.MX(6, layout.errors - seen.stop)
+    jacobian = ca.horzcat(by_core, others[0], by_marker, others[1])
+    noise = by_numbers("sighting_noise", sighting_gate.noise, s.SIGHTING_INPUTS)(inputs)
+    cross = ca.mtimes(covariance, jacobian.T)
+    gate = by_numbers("sighting_gate", sighting_gate.gate, 6, (6, 6), s.SIGHTING_INPUTS)
+    inverse, outputs = gate(innovation, ca.mtimes(jacobian, cross) + noise, inputs)
+    gain = ca.mtimes(cross, inverse)
+    covariance = up.covariance_after(covariance, jacobian, noise, cross, gain)
+    nominal, covariance = _inject(nominal, covariance, ca.mtimes(gain, innovation), markers)
+    result = ca.vertcat(nominal, ca.vec(covariance), packed[layout.matched.start :])
+    return _function(f"sighting_step_{markers}_{index}", [packed, inputs], [result, ca.vertcat(outputs, innovation)])
+
+
+@lru_cache(maxsize=1)
+def _geometry() -> ca.Function:
+    return by_numbers("geometry", sighting_gate.geometry, s.CORE_NOMINAL, s.MARKER_NOMINAL, s.MARKER_NOMINAL)
+
+
+class Steps(NamedTuple):
+    """All that is generated for a number of markers; of the sightings one for each of them."""
+
+    prediction: ca.Function
+    odometry: ca.Function
+    accelerometer: ca.Function
+    sightings: tuple[ca.Function, ...]
 
 
 @lru_cache(maxsize=8)
-def steps(markers: int) -> tuple[ca.Function, ca.Function, ca.Function]:
-    """`prediction`, `odometry_step` and `accelerometer_step`, as they are generated."""
-    return prediction(markers), odometry_step(markers), accelerometer_step(markers)
+def steps(markers: int) -> Steps:
+    """As they are generated."""
+    sightings = tuple(sighting_step(markers, index) for index in range(markers))
+    return Steps(prediction(markers), odometry_step(markers), accelerometer_step(markers), sightings)
 
 
 @lru_cache(maxsize=8)
-def compiled_steps(markers: int) -> tuple[ca.Function, ca.Function, ca.Function]:
+def compiled_steps(markers: int) -> Steps:
     """`steps`, compiled where that can be had (a second or two, once a computer), into one library: they share code."""
-    step, odometry, accelerometer = native.compiled(steps(markers), f"observer{markers}")
-    return step, odometry, accelerometer
+    *generated, sightings = steps(markers)
+    step, odometry, accelerometer, *seen = native.compiled([*generated, *sightings], f"observer{markers}")
+    return Steps(step, odometry, accelerometer, tuple(seen))
 
 
 @lru_cache(maxsize=1)
@@ -224,17 +251,9 @@ def extrapolation() -> ca.Function:
 
 
 @lru_cache(maxsize=1)
-def marker_geometry() -> ca.Function:
-    """(core, marker (7,), sighting (7,)) -> (innovation (6,), H by core (6, 21), H by marker (6, 6)) of eq. 7."""
-    core, marker, relative = ca.SX.sym("core", s.CORE_NOMINAL), ca.SX.sym("marker", 7), ca.SX.sym("relative", 7)
-    innovation = me.marker_innovation(core, marker, relative)
-    return _function("marker_geometry", [core, marker, relative], [innovation, *me.marker_jacobians(core, marker)])
-
-
-@lru_cache(maxsize=1)
 def marker_location() -> ca.Function:
     """(core, sighting (7,)) -> (marker in the world (7,), its Jacobians by core (6, 21) and by sighting (6, 6))."""
-    core, relative = ca.SX.sym("core", s.CORE_NOMINAL), ca.SX.sym("relative", 7)
+    core, relative = ca.SX.sym("core", s.CORE_NOMINAL), ca.SX.sym("relative", s.MARKER_NOMINAL)
     return _function(
         "marker_location", [core, relative], [me.locate_marker(core, relative), *me.locating_jacobians(core, relative)]
     )

@@ -50,7 +50,7 @@ class Observer:
     Args:
         airframe: model and noise.
         prepared_markers: for how many markers the functions are compiled at once; more are generated in flight when
-            seen, which takes some tenths of a second each.
+            seen, which takes a tenth of a second each.
 
     Attributes:
         counters: what was refused. statistics: of the last innovation, by sensor: its normalised square, its dof.

@@ -122,6 +122,18 @@ IN_ACCELEROMETER_VARIANCE = slice(48, 51)  # m^2/s^4, each axis
 ACCELEROMETER_INPUTS = 51
 IN_ACCELEROMETER = slice(45, 51)
 
+# Input of a sighting step.
+IN_SIGHTING = slice(0, 7)  # pose of the marker relative to the body, as seen
+IN_SIGHTING_COVARIANCE = slice(7, 43)  # (6, 6), as the detector states it
+IN_SCALE = 43  # factor on that, as matched
+IN_SIGHTING_WEIGHT = 44  # 0..1, weight of this innovation in the matching
+SIGHTING_INPUTS = 45
+
+# Output of a sighting step beside the new packed state.
+OUT_SIGHTING_NIS, OUT_SIGHTING_ACCEPTED, OUT_SIGHTING_SCALE = range(3)
+OUT_SIGHTING_INNOVATION = slice(3, 9)  # m, rad
+SIGHTING_OUTPUTS = 9
+
 # Output of an accelerometer step beside the new packed state.
 OUT_FORCE_NIS, OUT_FORCE_ACCEPTED, OUT_FORCE_VARIANCE = range(3)  # the last: what the sample says of the variance
 ACCELEROMETER_OUTPUTS = 3

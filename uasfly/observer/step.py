@@ -88,12 +88,14 @@ class Stepper:
 
         Args:
             markers: how many.
-            in_flight: takes some tenths of a second; otherwise they are compiled, which may take some seconds.
+            in_flight: takes a tenth of a second; otherwise they are compiled, which may take a second or two.
         """
         if markers not in self._predictions:
             generated = functions.steps(markers) if in_flight else functions.compiled_steps(markers)
-            calls = [functions.Caller(step) for step in generated]
-            self._predictions[markers], self._odometry_steps[markers], self._accelerometer_steps[markers] = calls
+            self._predictions[markers] = functions.Caller(generated.prediction)
+            self._odometry_steps[markers] = functions.Caller(generated.odometry)
+            self._accelerometer_steps[markers] = functions.Caller(generated.accelerometer)
+            self._marker_algebra.prepare(generated)
 
     def start(self, odometry: Odometry, airborne: bool) -> Moment:
         """The first moment, from a complete odometry sample: force, GNSS bias and wanders zero.

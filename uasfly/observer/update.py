@@ -106,5 +106,10 @@ def joseph_update(covariance: Matrix, jacobian: Matrix, noise: Matrix, allowed: 
     cross = ca.mtimes(covariance, jacobian.T)
     inverse = inverse_of_symmetric_3(ca.mtimes(jacobian, cross) + noise)
     gain = ca.mtimes(allowed, ca.mtimes(cross, inverse))
+    return gain, covariance_after(covariance, jacobian, noise, cross, gain)
+
+
+def covariance_after(covariance: Matrix, jacobian: Matrix, noise: Matrix, cross: Matrix, gain: Matrix) -> Matrix:
+    """Joseph form (n, n) for any gain (n, m); `cross` is P H' (n, m)."""
     left = covariance - ca.mtimes(gain, cross.T)
-    return gain, symmetric(left - ca.mtimes(ca.mtimes(left, jacobian.T) - ca.mtimes(gain, noise), gain.T))
+    return symmetric(left - ca.mtimes(ca.mtimes(left, jacobian.T) - ca.mtimes(gain, noise), gain.T))
