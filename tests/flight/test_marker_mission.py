@@ -84,10 +84,8 @@ class MarkerFlight(Flight):
     """A flight whose vehicle follows position and yaw exactly."""
 
     def __init__(self, flown: Mission | None = None, engage: Engage = Engage.AUTO, **spotted: Any) -> None:
-        super().__init__(flown or mission(), engage)
         self.spotter = Spotter()
-        self.observer = self.spotter
-        self.pilot.observer = self.spotter  # type: ignore[assignment]
+        super().__init__(flown or mission(), engage, self.spotter)
         for name, value in spotted.items():
             setattr(self.spotter, name, value)
 

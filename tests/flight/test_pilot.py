@@ -140,8 +140,10 @@ class FakeController:
 class Flight:
     """A pilot and a vehicle that does as it is asked and follows the reference exactly."""
 
-    def __init__(self, mission: Mission | None = None, engage: Engage = Engage.AUTO) -> None:
-        self.observer = FakeObserver()
+    def __init__(
+        self, mission: Mission | None = None, engage: Engage = Engage.AUTO, observer: FakeObserver | None = None
+    ) -> None:
+        self.observer = observer or FakeObserver()
         self.controller = FakeController()
         self.pilot = Pilot(f550(), mission or _mission(), self.observer, self.controller, engage)  # type: ignore[arg-type]
         self.time_s = 50.0

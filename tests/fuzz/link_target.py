@@ -143,7 +143,7 @@ class LinkSession:
         if rng.random() < 0.05:
             self._begin_something(rng)
         await asyncio.sleep(0.0)
-        dropped = self._link._decoder.dropped.total()
+        dropped = self._link._inbox.dropped.total()
         for sample in self._link.poll():
             check_sample(sample)
         now_s = time.monotonic()
@@ -156,7 +156,7 @@ class LinkSession:
         self._link.losses()
         if self._problems:
             raise FindingError("; ".join(self._problems))
-        return self._link._decoder.dropped.total() == dropped
+        return self._link._inbox.dropped.total() == dropped
 
     def _begin_something(self, rng: Rng) -> None:
         kind = rng.integers(3)

@@ -17,7 +17,16 @@ from uasfly.errors import LinkError
 from uasfly.link.mavsdk_link import MavsdkLink
 from uasfly.link.ports import free_udp_port
 from uasfly.link.protocol import VehicleLink
-from uasfly.messages import FlightMode, OdometrySample, Setpoint, TextSample, TruthSample, VehicleSample
+from uasfly.messages import (
+    FlightMode,
+    LinkEvent,
+    LinkSample,
+    OdometrySample,
+    Setpoint,
+    TextSample,
+    TruthSample,
+    VehicleSample,
+)
 
 LEVEL = Setpoint(0.0, 0.0, 0.0, 0.5 * math.pi, 0.0, 0.5)
 
@@ -162,6 +171,7 @@ async def test_a_restart_of_the_vehicle_is_announced_and_set_up_again(pair: Pair
     samples = await until(link, lambda got: any("restarted" in text for text in texts(got)))
     warning = next(s for s in samples if isinstance(s, TextSample) and "restarted" in s.text)
     assert warning.severity == 4
+    assert LinkEvent.REBOOTED in [sample.event for sample in samples if isinstance(sample, LinkSample)]
     await arrived(lambda: 331.0 in [parameters[0] for parameters in vehicle.commands(511)])
     await arrived(lambda: link.clock_offset is not None)
     assert link.clock_offset == pytest.approx(-vehicle.clock_ahead_s, abs=0.05)

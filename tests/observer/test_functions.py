@@ -187,7 +187,7 @@ def test_compiled_steps_are_those_of_the_virtual_machine(markers: int) -> None:
     packed = packed_state(markers, rng)
     inputs = odometry_inputs(packed[: s.CORE_NOMINAL], rng)
     expected = evaluate_step(packed, inputs, markers)
-    predict, update = functions.compiled_steps(markers)
+    predict, update, _ = functions.compiled_steps(markers)
     result, outputs, predicted = np.empty(packed.size), np.empty(s.ODOMETRY_OUTPUTS), np.empty(packed.size)
     functions.Caller(update)((packed, inputs), (result, outputs))
     functions.Caller(predict)((packed, inputs), (predicted,))

@@ -5,7 +5,7 @@ import pytest
 
 from tests.observer.airframes import f550
 from uasfly.airframe import GRAVITY_M_S2
-from uasfly.observer.step import hover_thrust_history
+from uasfly.observer.drive import hover_thrust_history
 from uasfly.observer.thrust import ThrustHistory
 
 

@@ -5,48 +5,30 @@ The same step serves the live flight, the rehearsal and the replay of a log: sam
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
 from uasfly.airframe import Airframe
-from uasfly.control.authority import AuthorityMeter
 from uasfly.control.controller import Controller, ControlResult
 from uasfly.flight.choices import EndingAction, Engage
 from uasfly.flight.clearance import Clearance
-from uasfly.flight.course import NOT_BEGUN, Course
+from uasfly.flight.course import Course
 from uasfly.flight.echo import echo, told
+from uasfly.flight.guidance import Guidance
 from uasfly.flight.marker_guide import MarkerGuide
-from uasfly.flight.monitors import Monitors, Watched
+from uasfly.flight.places import Places
 from uasfly.flight.preflight import Preflight, announcements, as_pilot_flies, stop_reason
-from uasfly.flight.response import Response
+from uasfly.flight.reporter import Reporter
 from uasfly.flight.sequencer import Sequencer
+from uasfly.flight.supervisor import Supervisor
 from uasfly.flight.trimmed_thrust import TrimmedThrust
 from uasfly.flight.view import VehicleView
 from uasfly.message_class import message
-from uasfly.messages import (
-    Action,
-    Alarm,
-    Array,
-    Authority,
-    Phase,
-    ReferenceHorizon,
-    Request,
-    Sample,
-    Setpoint,
-    StateEstimate,
-    Status,
-)
+from uasfly.messages import Array, Phase, ReferenceHorizon, Request, Sample, Setpoint, StateEstimate, Status
 from uasfly.mission import Mission
-from uasfly.observer.diagnosis import Diagnosis
 from uasfly.observer.observer import Observer
 from uasfly.observer.pairs import paired
 from uasfly.preflight_messages import PreflightCheck
 from uasfly.wind.drag_curve import wind_settings
 from uasfly.wind.meter import WindMeter
 from uasfly.wind_messages import WindEstimate
-
-_ENDINGS = {Action.END: None, Action.RETURN: EndingAction.RETURN, Action.LAND: EndingAction.LAND}
 
 
 @message
@@ -99,30 +81,27 @@ class Pilot:
             mission.monitors.telemetry,
             clearance=Clearance(needed=preflight, only_check=only_check),
         )
-        self._preflight = Preflight(mission, airframe, engage)
-        self.monitors = Monitors(mission, airframe)
         self.course = Course(mission, airframe.limits)
+        self._preflight = Preflight(mission, airframe, engage)
+        wind = wind_settings(airframe)
+        feels = airframe.observer.accelerometer_sigma_m_s2 is not None
+        self._wind_meter = None if wind is None else WindMeter(wind, airframe.limits, feels)
+        self._thrust = TrimmedThrust(observer, controller)
         self._guide: MarkerGuide | None = None
         observer.retakes_moved = mission.marker is None  # else it is the guide's to say
         if mission.marker is not None:
             self._guide = MarkerGuide(mission.marker, marker_id, airframe.limits.yaw_rate_rad_s)
-        self._meter = AuthorityMeter(airframe.limits, airframe.model, mission.transition.speed_m_s)
-        self._authority: Authority | None = None  # at the monitors' last look
-        wind = wind_settings(airframe)
-        feels = airframe.observer.accelerometer_sigma_m_s2 is not None
-        self._wind_meter = None if wind is None else WindMeter(wind, airframe.limits, feels)
-        self._wind: WindEstimate | None = None
-        self._response = Response()
-        self._thrust = TrimmedThrust(observer, controller)
-        self._estimate: StateEstimate | None = None  # of the last step
-        self._phase = self.sequencer.phase  # as far as this object has followed it
-        self._ground: Array | None = None  # where the vehicle last stood
-        self._met: Array | None = None  # where it was first known
-        self._leg_started = False
-        self._streamed = False
-        self._control: ControlResult | None = None
+        view, sequencer, course, guide = self.view, self.sequencer, self.course, self._guide
+        self._places = places = Places(mission.frame)
+        self._guidance = Guidance(mission, sequencer, course, places, guide)
+        self._supervisor = Supervisor(mission, airframe, observer, view, sequencer, course, places, guide)
+        self._reporter = Reporter(view, sequencer, course, self._supervisor, self._thrust, guide)
+        # of the cycle before, where there was one
         self._time_s: float | None = None
-        self._reference: Array | None = None  # (3,) m, world: where the vehicle should be in this step
+        self._estimate: StateEstimate | None = None
+        self._wind: WindEstimate | None = None
+        self._control: ControlResult | None = None
+        self._streamed = False
 
     @property
     def done(self) -> bool:
@@ -161,8 +140,7 @@ class Pilot:
         self.observer.set_k_thrust(k_thrust)
         estimate = self._estimate = self.observer.estimate(time_s)
         if estimate is not None:
-            self._note_places(estimate)
-
+            self._places.note(estimate, stands=not (self.view.armed or self.view.in_air))
         if meter is not None:
             self._wind = meter.step(time_s, estimate, self.view.in_air, k_thrust)
         sequencer = self.sequencer
@@ -170,15 +148,10 @@ class Pilot:
             self.announce(4, f"bundle {number} is seen {away_m:.2f} m from where it was: moved; it is taken anew")
         requests = sequencer.step(time_s, self.view, estimate, self.course.done(time_s))
         checks = self._check_before_flight(time_s, samples, estimate)
-        setpoint, control = None, None
-        self._reference = None
-        alarms: tuple[Alarm, ...] = ()
+        reference: Array | None = None  # (3,) m, world: where the vehicle should be in this cycle
         if estimate is not None:
-            if self._guide is not None:
-                self._guide.look(time_s, self.observer)
-            self._follow_phase(time_s, estimate)
-            alarms = self._watch(time_s, estimate, k_thrust)
-            self._respond(time_s, estimate, alarms)
+            reference = self._guide_and_supervise(time_s, estimate, k_thrust)
+        setpoint, control = None, None
         if sequencer.streaming and estimate is not None:
             setpoint = None if sequencer.in_offboard else echo(self.view, time_s, self.airframe.limits)
             if setpoint is None:
@@ -192,7 +165,8 @@ class Pilot:
             self.observer.sent(setpoint, in_offboard=sequencer.in_offboard)
         self._streamed = setpoint is not None
         self._control, self._time_s = control, time_s
-        return StepResult(setpoint, requests, self._status(time_s, estimate, alarms), control, checks)
+        status = self._reporter.status(time_s, estimate, reference, self._wind, control)
+        return StepResult(setpoint, requests, status, control, checks)
 
     def _take_in(self, samples: tuple[Sample, ...]) -> None:
         self.view.update(samples)
@@ -201,6 +175,22 @@ class Pilot:
         if self._wind_meter is not None:
             for sample in samples:
                 self._wind_meter.add(sample)
+
+    def _guide_and_supervise(self, time_s: float, estimate: StateEstimate, k_thrust_m_s2: float) -> Array | None:
+        """Let guidance follow the phase, and again where the monitors end it; where the vehicle should be meanwhile."""
+        course, guidance = self.course, self._guidance
+        if self._guide is not None:
+            self._guide.look(time_s, self.observer)
+        before_s = time_s if self._time_s is None else self._time_s
+        if guidance.follow(time_s, estimate, before_s):
+            self._streamed = False
+        acting = guidance.flies_legs
+        reference = course.place_at(time_s) if acting and course.origin is not None else None
+        if self._supervisor.step(
+            time_s, estimate, reference, self._wind, self._control, acting=acting, k_thrust_m_s2=k_thrust_m_s2
+        ):
+            guidance.follow(time_s, estimate, before_s)
+        return reference
 
     def _check_before_flight(
         self, time_s: float, samples: tuple[Sample, ...], estimate: StateEstimate | None
@@ -211,185 +201,13 @@ class Pilot:
             preflight.look(time_s, samples, self.view)
         if not sequencer.clearance.awaited or not (self.done or preflight.has_facts(time_s)):
             return ()
-        diagnosis = None if estimate is None else self._diagnosis(time_s)
-        origin = None if estimate is None else self._origin_of(estimate)
+        diagnosis, origin = None, None
+        if estimate is not None:
+            diagnosis = self.observer.diagnose(time_s, self.mission.monitors.estimate.window_s)
+            origin = self._places.origin(estimate)
         checks = preflight.judge(self.view, estimate, diagnosis, origin)
         if self.view.in_air and sequencer.engage is Engage.PILOT and not sequencer.clearance.only_check:
             checks = as_pilot_flies(checks)
         sequencer.announcements += announcements(checks)
         sequencer.clear(time_s, stop_reason(checks))
         return checks
-
-    def _diagnosis(self, time_s: float) -> Diagnosis:
-        return self.observer.diagnose(time_s, self.mission.monitors.estimate.window_s)
-
-    def _note_places(self, estimate: StateEstimate) -> None:
-        if self._met is None:
-            self._met = estimate.position_in_world
-        if not (self.view.armed or self.view.in_air):
-            self._ground = estimate.position_in_world
-
-    def _follow_phase(self, time_s: float, estimate: StateEstimate) -> None:
-        """Origin and reference for the phase that the flight is in now."""
-        sequencer, course, guide = self.sequencer, self.course, self._guide
-        before, self._phase = self._phase, sequencer.phase
-        changed = before is not self._phase
-        if guide is not None and self._phase in (Phase.ENGAGE, Phase.LEGS):
-            guide.place(course)
-        match self._phase:
-            case Phase.PREFLIGHT if changed:
-                course.drop()
-            case Phase.TAKEOFF if changed:
-                course.origin = self._origin_of(estimate)
-            case Phase.ENGAGE:
-                if before is Phase.LEGS:
-                    course.freeze(time_s)
-                elif changed and before is not Phase.TAKEOFF:
-                    course.origin = self._origin_of(estimate)
-                course.engage(time_s, estimate)
-                if guide is not None:
-                    guide.stop_waiting()
-            case Phase.LEGS:
-                self._follow_legs(time_s, estimate, changed)
-            case Phase.ENDING if changed and not course.done(time_s):
-                course.stay(time_s, estimate)  # what has been announced; the reference would fly on
-        if course.problem and self._phase in (Phase.ENGAGE, Phase.LEGS):
-            sequencer.end(time_s, course.problem)
-
-    def _follow_legs(self, time_s: float, estimate: StateEstimate, changed: bool) -> None:
-        """Begin, freeze or take up; the controller then starts from what the vehicle is told."""
-        course, sequencer = self.course, self.sequencer
-        if not course.begun:
-            if changed or sequencer.silence_ended:
-                course.start(time_s, estimate)
-            if not course.begun and self._guide is not None and sequencer.streaming:
-                self._wait(time_s, self._guide)
-        elif changed or sequencer.silence_ended:
-            course.freeze(time_s if self._time_s is None else self._time_s)
-            course.take_up(time_s, estimate)
-        elif not sequencer.streaming:
-            course.freeze(time_s)
-        if changed or sequencer.silence_ended:
-            self._streamed = False
-
-    def _wait(self, time_s: float, guide: MarkerGuide) -> None:
-        """In offboard, but nobody knows yet where the marker is."""
-        assert self.mission.marker is not None
-        text = guide.wait(self.course)
-        if text:
-            self._leave_mission(time_s, Action(self.mission.marker.until_seen.then), text)
-
-    def _leave_mission(self, time_s: float, action: Action, reason: str) -> None:
-        """One of the actions after which the mission is over."""
-        if action is Action.HAND_OVER:
-            self.sequencer.leave(time_s, reason)
-        else:
-            self.sequencer.end(time_s, reason, _ENDINGS[action])
-
-    def _watch(self, time_s: float, estimate: StateEstimate, k_thrust: float) -> tuple[Alarm, ...]:
-        """Ask the monitors; they look while uasfly flies, and at some things always."""
-        origin = self.course.origin
-        flying = self._phase is Phase.LEGS and self.sequencer.streaming and origin is not None
-        self._reference = self.course.place_at(time_s) if flying else None
-        guide = self._guide
-        if self.monitors.due(time_s, self._control):
-            self._authority = self._measure_authority(time_s, estimate, k_thrust)
-            place = np.zeros(3) if origin is None else origin
-            self.monitors.look(
-                Watched(
-                    time_s=time_s,
-                    flying=flying,
-                    estimate=estimate,
-                    diagnosis=self._diagnosis(time_s),
-                    view=self.view,
-                    origin=place,
-                    home=self._home(place),
-                    reference=self._reference,
-                    authority=self._authority,
-                    marker=None if guide is None else guide.marker,
-                    by_marker=guide is not None and self.course.begun,
-                    wind=self._wind,
-                )
-            )
-        alarms = self.monitors.alarms
-        if guide is not None:
-            guide.judge(self.observer, alarms, self.course.begun)
-            self.sequencer.announcements += guide.announcements
-            guide.announcements.clear()
-        return alarms
-
-    def _respond(self, time_s: float, estimate: StateEstimate, alarms: tuple[Alarm, ...]) -> None:
-        """Do what the worst alarm asks for, where uasfly flies."""
-        sequencer, response, settings = self.sequencer, self._response, self.mission.monitors
-        acting = self._phase is Phase.LEGS and sequencer.streaming
-        sequencer.announcements += response.update(time_s, alarms, acting)
-        if not acting:
-            return
-        if response.action is Action.HAND_OVER or response.action in _ENDINGS:
-            self._leave_mission(time_s, response.action, response.text)
-        elif response.since_s is not None and time_s - response.since_s > settings.longest_hold_s:
-            sequencer.end(time_s, f"held for {settings.longest_hold_s:.0f} s: {response.text}")
-        else:
-            self.course.act(time_s, response.action, settings.slow_pace, settings.back_off_m)
-            return
-        self._follow_phase(time_s, estimate)
-
-    def _measure_authority(self, time_s: float, estimate: StateEstimate, k_thrust_m_s2: float) -> Authority:
-        home = self._home(estimate.position_in_world)
-        return self._meter.update(time_s, estimate.force_in_world, k_thrust_m_s2, home - estimate.position_in_world)
-
-    def _home(self, otherwise: Array) -> Array:
-        """Where the vehicle stood before it took off, or was first met."""
-        for place in (self._ground, self._met):
-            if place is not None:
-                return place
-        return otherwise
-
-    def _origin_of(self, estimate: StateEstimate) -> Array:
-        if self.mission.frame == "local":
-            return np.zeros(3)
-        if self._phase is Phase.TAKEOFF:
-            return estimate.position_in_world
-        if self._ground is not None:
-            return self._ground
-        x, y, _ = estimate.position_in_world.tolist()
-        return np.array((x, y, 0.0))  # met in the air: PX4's local origin lies on the ground where it booted
-
-    def _status(self, time_s: float, estimate: StateEstimate | None, alarms: tuple[Alarm, ...]) -> Status:
-        sequencer, course, view = self.sequencer, self.course, self.view
-        in_legs = sequencer.phase is Phase.LEGS
-        progress = course.progress(time_s) if in_legs or sequencer.phase is Phase.ENGAGE else NOT_BEGUN
-        leg = progress.leg if in_legs else -1
-        self._leg_started |= leg >= 0
-        reference = None
-        if in_legs and (course.begun or self._guide is not None):
-            reference = course.place_at(time_s) if self._reference is None else self._reference
-        announcements = tuple(sequencer.announcements)
-        sequencer.announcements.clear()
-        battery = view.battery
-        return Status(
-            time_s=time_s,
-            phase=sequencer.phase,
-            leg=leg,
-            leg_started=self._leg_started and in_legs,
-            progress=1.0 if sequencer.phase in (Phase.ENDING, Phase.DONE) else progress.share,
-            estimate=estimate,
-            reference_position_in_world=reference,
-            fallback=self._control.fallback if self._control is not None else "",
-            reason=sequencer.reason,
-            announcements=announcements,
-            mode=view.mode,
-            armed=view.armed,
-            battery_remaining=math.nan if battery is None else battery.remaining,
-            battery_voltage_v=view.voltage_v or math.nan,
-            telemetry_age_s=view.odometry_age_s(time_s),
-            authority=None if estimate is None else self._authority,
-            alarms=alarms,
-            action=self._response.action,
-            pace=progress.pace if in_legs else 0.0,
-            pilot_flies=sequencer.pilot_flies,
-            marker_age_s=math.nan if self._guide is None else self._guide.age_s,
-            waits_for="the marker" if in_legs and self._guide is not None and not course.begun else "",
-            wind=self._wind,
-            thrust_trim=self._thrust.trim,
-        )

@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine, Mapping
 from typing import Any
 
 from uasfly.errors import LinkError
 from uasfly.link.bridge import Bridge
+from uasfly.link.clock import ClockMap
 from uasfly.link.commands import CommandChannel
+from uasfly.link.inbox import Inbox
 from uasfly.link.ports import DeviceWatch, check_available
-from uasfly.link.slots import Slot
 from uasfly.link.streams import ask_for_streams
 from uasfly.link.timesync import TimeSync
 from uasfly.link.urls import ConnectionUrl
+from uasfly.messages import LinkEvent, LinkSample
 
+SETTLING_S = 1.0  # `settled` waits this long for the first time exchanges and message intervals
+SETTLED_EXCHANGES = 5
 SILENCE_S = 3.0  # PX4 sends a heartbeat every second
 REOPEN_INTERVAL_S = 2.0
 WARNING, NOTICE = 4, 5  # MAVLink severities
-
-Say = Callable[[int, str], None]
 
 _log = logging.getLogger("uasfly.link")
 
@@ -31,30 +34,30 @@ class Upkeep:
 
     Args:
         bridge, url: the connection.
-        time_sync: the time exchange to drive.
+        clock: the clock map that the time exchange feeds.
         commands: channel for the message intervals.
-        heartbeats: slot that the heartbeats go through.
+        inbox: where the heartbeats go through, and where the pilot finds what is announced.
         want_truth: whether to ask for the true state too.
-        say: announces something to the pilot, with its MAVLink severity.
     """
 
     def __init__(
         self,
         bridge: Bridge,
         url: ConnectionUrl,
-        time_sync: TimeSync,
+        clock: ClockMap,
         commands: CommandChannel,
-        heartbeats: Slot,
+        inbox: Inbox,
         want_truth: bool,
-        say: Say,
     ) -> None:
         self._bridge = bridge
         self._url = url
-        self._time_sync = time_sync
+        self._clock = clock
+        self._time_sync = TimeSync(clock)
+        self._synchronised = asyncio.Event()
         self._commands = commands
-        self._heartbeats = heartbeats
+        self._inbox = inbox
+        self._heartbeats = inbox.slots["HEARTBEAT"]
         self._want_truth = want_truth
-        self._say = say
         self._device = DeviceWatch(url.device) if url.scheme == "serial" else None
         self._tasks: set[asyncio.Task[None]] = set()
         self._stream_task: asyncio.Task[None] | None = None
@@ -71,10 +74,24 @@ class Upkeep:
             self._stream_task.cancel()
         self._stream_task = self._spawn(self._stream())
 
-    async def streams_asked(self) -> None:
-        """Wait until the vehicle has been asked for all message intervals."""
-        if self._stream_task is not None:
-            await asyncio.wait((self._stream_task,))
+    async def settled(self) -> None:
+        """Wait until all message intervals have been asked for and the clocks are synchronised, at most 1 s."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(SETTLING_S):
+                if self._stream_task is not None:
+                    await asyncio.wait((self._stream_task,))
+                await self._synchronised.wait()
+        if not self._clock.synchronised:
+            self._inbox.say(WARNING, "the vehicle does not answer TIMESYNC: samples carry the time of their arrival")
+
+    def take_time(self, fields: Mapping[str, Any], arrival_s: float) -> None:
+        """Take a TIMESYNC; a vehicle that has restarted is announced and set up again."""
+        if self._time_sync.receive(fields, arrival_s):
+            self._inbox.say(WARNING, "the vehicle has restarted; its clock and message rates are set up again")
+            self._inbox.add(LinkSample(time.monotonic(), LinkEvent.REBOOTED))
+            self.ask_for_streams()
+        if self._clock.exchanges >= SETTLED_EXCHANGES:
+            self._synchronised.set()
 
     def cancel(self) -> list[asyncio.Task[None]]:
         """Stop all tasks; returns them, to be awaited."""
@@ -91,7 +108,7 @@ class Upkeep:
 
     async def _stream(self) -> None:
         for problem in await ask_for_streams(self._commands, self._want_truth, narrow=self._device is not None):
-            self._say(WARNING, problem)
+            self._inbox.say(WARNING, problem)
 
     async def _keep_time(self) -> None:
         while True:
@@ -105,9 +122,9 @@ class Upkeep:
             await asyncio.sleep(SILENCE_S)
             if self._heartbeats.received != received:
                 continue
-            self._say(WARNING, f"no heartbeat from the vehicle for {SILENCE_S:g} s")
+            self._inbox.say(WARNING, f"no heartbeat from the vehicle for {SILENCE_S:g} s")
             await self._until_heartbeat(received)
-            self._say(NOTICE, "the vehicle's heartbeat is back")
+            self._inbox.say(NOTICE, "the vehicle's heartbeat is back")
             self.ask_for_streams()
 
     async def _until_heartbeat(self, received: int) -> None:

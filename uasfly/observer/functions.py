@@ -1,7 +1,9 @@
 """The generated functions of the filter: prediction, odometry step, extrapolation and marker geometry.
 
 Each works on packed vectors (`states.Layout` and the IN_ and OUT_ indices) and is built once a process for each number
-of markers.
+of markers. Algebra of whole covariances is matrix by matrix (CasADi's MX): a handful of loops. Written out number by
+number it was half a megabyte of code that runs once a cycle, and came from memory each time. What is small and thin is
+written out (`by_numbers`).
 """
 
 from __future__ import annotations
@@ -16,17 +18,14 @@ from uasfly import native
 from uasfly.messages import Array
 from uasfly.observer import error_state as es
 from uasfly.observer import measurements as me
+from uasfly.observer import odometry
 from uasfly.observer import states as s
 from uasfly.observer import update as up
+from uasfly.observer.matrices import Matrix, by_numbers
 
-# A sensor whose mean innovation exceeds this many configured sigmas has jumped; the state then follows it at about this
-# speed (see `_recovery`), in the order of states.SENSORS: rad/s, m/s, m/s^2.
-JUMP_SIGMAS = 2.0
-RECOVERY_RATES = (1.0, 50.0, 30.0)  # the position's goes into the GNSS bias, which nothing flies by; a gust is fast
 # Normalised innovation squared beyond which a reading of the accelerometer is an error: the edge of a jet is out of the
 # common too, and it is what the accelerometer is there for. Absurd readings do not come this far (see `door`).
 FORCE_GATE = 50.0
-FOLLOW_RATE_M_S = 3.0  # the state's way back to a position that it has lost
 
 
 class Caller:
@@ -56,36 +55,41 @@ class Caller:
         self._evaluate()
 
 
-def _function(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:
+def _function(name: str, arguments: list[Matrix], results: list[Matrix]) -> ca.Function:
     return ca.Function(name, arguments, [ca.densify(result) for result in results], {"cse": True})
 
 
-def _predicted_covariance(covariance: ca.SX, core: ca.SX, inputs: ca.SX) -> ca.SX:
+def _unpack(packed: ca.MX, layout: s.Layout) -> tuple[ca.MX, ca.MX]:
+    return packed[layout.nominal], ca.reshape(packed[layout.covariance], layout.errors, layout.errors)
+
+
+@lru_cache(maxsize=1)
+def _motion() -> ca.Function:
+    """(core, inputs) -> core after IN_DT, Phi and Q (21, 21)."""
+
+    def motion(core: ca.SX, inputs: ca.SX) -> list[ca.SX]:
+        return [expression(core, inputs) for expression in (es.predict_nominal, es.transition, es.noise_covariance)]
+
+    return by_numbers("motion", motion, s.CORE_NOMINAL, s.PREDICTION_INPUTS)
+
+
+def _predict(nominal: ca.MX, covariance: ca.MX, inputs: ca.MX) -> tuple[ca.MX, ca.MX]:
     """Phi P Phi' + Q; markers are at rest (eq. 3), so that only their correlation with the core turns."""
-    n = covariance.shape[0]
-    move = ca.diagcat(es.transition(core, inputs), ca.SX.eye(n - s.CORE_ERROR))
-    noise = ca.diagcat(es.noise_covariance(core, inputs), ca.SX(n - s.CORE_ERROR, n - s.CORE_ERROR))
-    return up.symmetric(ca.mtimes(ca.mtimes(move, covariance), move.T) + noise)
-
-
-def _unpack(packed: ca.SX, layout: s.Layout) -> tuple[ca.SX, ca.SX]:
-    covariance = up.symmetric(ca.reshape(packed[layout.covariance], layout.errors, layout.errors))
-    return packed[layout.nominal], covariance
-
-
-def _predict(nominal: ca.SX, covariance: ca.SX, inputs: ca.SX) -> tuple[ca.SX, ca.SX]:
-    core = nominal[: s.CORE_NOMINAL]
-    moved = ca.vertcat(es.predict_nominal(core, inputs), nominal[s.CORE_NOMINAL :])
-    return moved, _predicted_covariance(covariance, core, inputs)
+    core, still = nominal[: s.CORE_NOMINAL], covariance.shape[0] - s.CORE_ERROR
+    moved, transition, noise = _motion()(core, inputs[: s.PREDICTION_INPUTS])
+    move = ca.diagcat(transition, ca.MX.eye(still))
+    grown = ca.mtimes(ca.mtimes(move, covariance), move.T) + ca.diagcat(noise, ca.MX(still, still))
+    return ca.vertcat(moved, nominal[s.CORE_NOMINAL :]), up.symmetric(grown)
 
 
 @lru_cache(maxsize=8)
 def prediction(markers: int) -> ca.Function:
     """(packed state, inputs (PREDICTION_INPUTS or longer)) -> packed state after IN_DT."""
     layout = s.Layout(markers)
-    packed, inputs = ca.SX.sym("packed", layout.size), ca.SX.sym("inputs", s.PREDICTION_INPUTS)
+    packed, inputs = ca.MX.sym("packed", layout.size), ca.MX.sym("inputs", s.PREDICTION_INPUTS)
     nominal, covariance = _predict(*_unpack(packed, layout), inputs)
-    result = ca.vertcat(es.normalised(nominal), ca.vec(covariance), packed[layout.matched.start :])
+    nominal = by_numbers("normalised", lambda nominal: [es.normalised(nominal)], layout.nominal_size)(nominal)
+    result = ca.vertcat(nominal, ca.vec(covariance), packed[layout.matched.start :])
     return _function(f"prediction_{markers}", [packed, inputs], [result])
 
 
@@ -93,47 +97,29 @@ def prediction(markers: int) -> ca.Function:
 def odometry_step(markers: int) -> ca.Function:
     """(packed state, inputs (ODOMETRY_INPUTS)) -> (packed state after prediction and updates, (ODOMETRY_OUTPUTS))."""
     layout = s.Layout(markers)
-    packed, inputs = ca.SX.sym("packed", layout.size), ca.SX.sym("inputs", s.ODOMETRY_INPUTS)
+    packed, inputs = ca.MX.sym("packed", layout.size), ca.MX.sym("inputs", s.ODOMETRY_INPUTS)
     nominal, covariance = _predict(*_unpack(packed, layout), inputs)
     core = nominal[: s.CORE_NOMINAL]
-    innovations = (
-        me.attitude_innovation(core, inputs[s.IN_QUATERNION]),
-        inputs[s.IN_POSITION] - me.measure_position(core),
-        inputs[s.IN_VELOCITY] - me.measure_velocity(core),
-    )
-    error = ca.SX.zeros(layout.errors)
+    innovations = by_numbers("innovations", odometry.innovations, s.CORE_NOMINAL, s.ODOMETRY_INPUTS)(core, inputs)
+    error = ca.MX.zeros(layout.errors)
     matched, means, nis, accepted, residuals = [], [], [], [], []
     for sensor in range(len(s.SENSORS)):
+        logic = odometry.SensorLogic(sensor, layout)
         block = packed[layout.matched][9 * sensor : 9 * sensor + 9]
         mean = packed[layout.mean][3 * sensor : 3 * sensor + 3]
-        state = _Sensor(sensor, up.symmetric(ca.reshape(block, 3, 3)), mean, inputs)
-        motion = _is_motion(inputs, sensor, markers)
-        covariance = covariance + _recovery(state, motion, layout)
-        free = inputs[s.IN_BIAS_FREE]
-        if sensor == s.POSITION_SENSOR:
-            free = ca.fmax(free, state.jumped * (1.0 - motion))
-        allowed = _held(free, inputs[s.IN_WANDER_FREE], layout)
-        jacobian = ca.horzcat(me.odometry_jacobian(core, sensor), ca.SX(3, layout.errors - s.CORE_ERROR))
+        covariance = covariance + logic.recovery(mean, inputs)
+        jacobian = logic.jacobian(core)
         residual = innovations[sensor] - ca.mtimes(jacobian, error)
         expected = ca.mtimes(ca.mtimes(jacobian, covariance), jacobian.T)
-        value, passed, inverse = up.innovation_test(residual, expected, state.noise, state.use)
-        shortened = ca.sqrt(up.GATE_3 / ca.fmax(value, up.GATE_3)) * residual
-        used = inputs[s.IN_CORRELATION][sensor] * state.noise
-        taken = passed
-        if sensor == s.POSITION_SENSOR:  # the state has lost its place: back to the measured one, but not in one step
-            lost = state.use * state.jumped * motion * (1.0 - passed)
-            used, taken = used + lost * ca.dot(residual, residual) * ca.SX.eye(3), passed + lost
-        gain, covariance = up.joseph_update(covariance, jacobian, used, taken * allowed)
+        used, allowed, block, mean, value, taken = logic.test(block, mean, residual, expected, inputs)
+        gain, covariance = up.joseph_update(covariance, jacobian, used, allowed)
         error = error + ca.mtimes(gain, residual)
-        # what contradicts everything else is no noise, and must not talk itself in as such
-        weight = state.use * inputs[s.IN_MATCHING_WEIGHT] * (1.0 - state.jumped * (1.0 - motion))
-        matched.append(ca.vec(up.matched_covariance(state.matched, state.noise, inverse, shortened, weight)))
-        told = shortened * (1.0 - passed) if sensor == s.POSITION_SENSOR else shortened
-        means.append(mean + state.use * inputs[s.IN_MEAN_WEIGHT] * (told - mean))
+        matched.append(block)
+        means.append(mean)
         nis.append(value)
         accepted.append(taken)
         residuals.append(residual)
-    nominal, covariance = _inject(nominal, covariance, error)
+    nominal, covariance = _inject(nominal, covariance, error, markers)
     result = ca.vertcat(nominal, ca.vec(covariance), *matched, *means)
     return _function(f"odometry_step_{markers}", [packed, inputs], [result, ca.vertcat(*nis, *accepted, *residuals)])
 
@@ -142,136 +128,86 @@ def odometry_step(markers: int) -> ca.Function:
 def accelerometer_step(markers: int) -> ca.Function:
     """(packed state, inputs (ACCELEROMETER_INPUTS)) -> (packed state after prediction and update, outputs).
 
-    The GNSS bias and the velocity's wander stay as they are (see `_held`): the accelerometer says nothing of them.
+    The GNSS bias and the velocity's wander stay as they are (see `odometry`): the accelerometer says nothing of them.
+    The attitude stays too: the edge of a gust is many sigmas of the force at once, and what the covariance makes of
+    that for the attitude is false (it turned as far as the attitude's own gate).
     """
     layout = s.Layout(markers)
-    packed, inputs = ca.SX.sym("packed", layout.size), ca.SX.sym("inputs", s.ACCELEROMETER_INPUTS)
+    packed, inputs = ca.MX.sym("packed", layout.size), ca.MX.sym("inputs", s.ACCELEROMETER_INPUTS)
     nominal, covariance = _predict(*_unpack(packed, layout), inputs)
-    core, model = nominal[: s.CORE_NOMINAL], (inputs[s.IN_THRUST], inputs[s.IN_DRAG])
-    residual = inputs[s.IN_SPECIFIC_FORCE] - me.measure_specific_force(core, *model)
-    jacobian = ca.horzcat(me.specific_force_jacobian(core, *model), ca.SX(3, layout.errors - s.CORE_ERROR))
-    noise = ca.SX(ca.diag(inputs[s.IN_ACCELEROMETER_VARIANCE]))
+
+    def reading(core: ca.SX, inputs: ca.SX) -> list[ca.SX]:
+        model = (inputs[s.IN_THRUST], inputs[s.IN_DRAG])
+        residual = inputs[s.IN_SPECIFIC_FORCE] - me.measure_specific_force(core, *model)
+        jacobian = me.specific_force_jacobian(core, *model)
+        return [residual, ca.horzcat(jacobian, ca.SX(3, layout.errors - s.CORE_ERROR))]
+
+    def test(residual: ca.SX, expected: ca.SX, inputs: ca.SX) -> list[ca.SX]:
+        noise = ca.SX(ca.diag(inputs[s.IN_ACCELEROMETER_VARIANCE]))
+        nis, _, inverse = up.innovation_test(residual, expected, noise, ca.SX(1.0))
+        passed = nis < FORCE_GATE
+        shortened = ca.sqrt(up.GATE_3 / ca.fmax(nis, up.GATE_3)) * residual
+        sample = up.matched_covariance(noise, noise, inverse, shortened, ca.SX(1.0))
+        held = ca.SX.eye(layout.errors)
+        for still in (s.D_ATTITUDE, s.D_BIAS, s.D_VELOCITY_WANDER, s.D_ATTITUDE_WANDER):
+            held[still, still] = ca.SX(3, 3)
+        return [noise, passed * ca.sparsify(held), ca.vertcat(nis, passed, 0.5 * (sample[0, 0] + sample[1, 1]))]
+
+    read = by_numbers("reading", reading, s.CORE_NOMINAL, s.ACCELEROMETER_INPUTS)
+    residual, jacobian = read(nominal[: s.CORE_NOMINAL], inputs)
     expected = ca.mtimes(ca.mtimes(jacobian, covariance), jacobian.T)
-    nis, _, inverse = up.innovation_test(residual, expected, noise, ca.SX(1.0))
-    passed = nis < FORCE_GATE
-    shortened = ca.sqrt(up.GATE_3 / ca.fmax(nis, up.GATE_3)) * residual
-    sample = up.matched_covariance(noise, noise, inverse, shortened, ca.SX(1.0))
-    held = ca.SX.eye(layout.errors)
-    held[s.D_BIAS, s.D_BIAS] = held[s.D_VELOCITY_WANDER, s.D_VELOCITY_WANDER] = ca.SX(3, 3)
-    gain, covariance = up.joseph_update(covariance, jacobian, noise, passed * ca.sparsify(held))
-    nominal, covariance = _inject(nominal, covariance, ca.mtimes(gain, residual))
+    gate = by_numbers("reading_test", test, 3, (3, 3), s.ACCELEROMETER_INPUTS)
+    noise, allowed, outputs = gate(residual, expected, inputs)
+    gain, covariance = up.joseph_update(covariance, jacobian, noise, allowed)
+    nominal, covariance = _inject(nominal, covariance, ca.mtimes(gain, residual), markers)
     result = ca.vertcat(nominal, ca.vec(covariance), packed[layout.matched.start :])
-    outputs = ca.vertcat(nis, passed, 0.5 * (sample[0, 0] + sample[1, 1]))
     return _function(f"accelerometer_step_{markers}", [packed, inputs], [result, outputs])
 
 
-class _Sensor:
-    """Symbols of one sensor of the odometry."""
+@lru_cache(maxsize=8)
+def _injected(markers: int) -> ca.Function:
+    """(nominal state, error) -> nominal state with the error added, reset Jacobian (n, n)."""
+    layout = s.Layout(markers)
 
-    def __init__(self, index: int, matched: ca.SX, mean: ca.SX, inputs: ca.SX) -> None:
-        self.index = index
-        self.matched = matched
-        self.mean = mean
-        self.use = inputs[s.IN_USE][index]
-        self.variance = inputs[s.IN_VARIANCE][index]
-        self.interval = inputs[s.IN_INTERVAL]
-        self.correlation = inputs[s.IN_CORRELATION][index]
-        self.noise = up.bounded(matched, self.variance)
-        self.jumped = ca.dot(mean, mean) > JUMP_SIGMAS**2 * self.variance
+    def injected(nominal: ca.SX, error: ca.SX) -> list[ca.SX]:
+        rotations = [s.D_ATTITUDE]
+        rotations += [slice(k + 3, k + 6) for k in range(s.CORE_ERROR, layout.errors, s.MARKER_ERROR)]
+        reset = ca.SX.eye(layout.errors)
+        for rotation in rotations:
+            reset[rotation, rotation] = es.reset_jacobian(error[rotation])
+        return [es.normalised(es.retract(nominal, error)), reset]
 
-
-def _held(bias_free: ca.SX, wander_free: ca.SX, layout: s.Layout) -> ca.SX:
-    """Matrix (n, n) on the gain that holds the GNSS bias and the velocity's wander where they are not free (0).
-
-    GNSS alone sees only the sum p + b. What an innovation says of that sum then goes to the position, and the bias
-    stays: the position follows GNSS, and the two cannot drift apart. The bias's noise goes on, so that the covariance
-    (Joseph) tells how far position and bias, with opposite signs, may have gone. When a marker frees the bias nothing
-    jumps. A measured position that has jumped against everything else frees it too: that is an error of GNSS, and the
-    vehicle has not moved. The velocity's wander is left to markers: GNSS that drifts would pass for it.
-    """
-    allowed = ca.SX.eye(layout.errors)
-    allowed[s.D_POSITION, s.D_BIAS] = (1.0 - bias_free) * ca.SX.eye(3)
-    allowed[s.D_BIAS, s.D_BIAS] = bias_free * ca.SX.eye(3)
-    allowed[s.D_VELOCITY_WANDER, s.D_VELOCITY_WANDER] = wander_free * ca.SX.eye(3)
-    return allowed
+    return by_numbers("injected", injected, layout.nominal_size, layout.errors)
 
 
-def _is_motion(inputs: ca.SX, sensor: int, markers: int) -> ca.SX:
-    """1 where what a sensor says against the model is the vehicle's motion, not the sensor's error.
-
-    Position and velocity vouch for each other (see `agreement`); a velocity without a position is believed, and one
-    beside a position that is known to be wrong: GNSS runs away, or a marker says where the vehicle is instead. On the
-    ground the model has nothing to say against it.
-    """
-    match sensor:
-        case s.POSITION_SENSOR if markers:
-            return inputs[s.IN_AGREES] * (1.0 - inputs[s.IN_BIAS_FREE])
-        case s.POSITION_SENSOR:
-            return inputs[s.IN_AGREES]
-        case s.VELOCITY_SENSOR:
-            alone = ca.fmax(1.0 - inputs[s.IN_USE][s.POSITION_SENSOR], inputs[s.IN_BIAS_FREE])
-            return ca.fmax(ca.fmax(inputs[s.IN_AGREES], alone), 1.0 - inputs[s.IN_AIRBORNE])
-        case _:
-            return ca.SX(1.0)
-
-
-def _recovery(sensor: _Sensor, motion: ca.SX, layout: s.Layout) -> ca.SX:
-    """Noise (n, n) that lets the state follow a sensor that has jumped and stays there.
-
-    After a jump by e the matched R is about e e'. A state with process noise q then closes the gap at e / tau,
-    tau = sqrt(r / q), r = R dt: with q = rate^2 dt that is `rate`, whatever the size of the jump and the sample rate.
-    So the estimate glides to the new place instead of stepping there, and a jump that returns soon has hardly moved it.
-    A jump of the position that is no motion is GNSS's: the noise goes to the bias, which is free meanwhile, so that it
-    takes the jump. There the mean counts only innovations outside the gate: what the filter expected (after silence) is
-    no jump. One that is motion is where the vehicle is: the state has lost it (in a silence), and glides back to it.
-    A velocity that is no motion is not followed.
-    """
-    rate = sensor.interval * RECOVERY_RATES[sensor.index]
-    variance = sensor.use * sensor.jumped * rate**2 * sensor.correlation
-    diagonal = ca.SX(layout.errors, 1)
-    match sensor.index:
-        case s.ATTITUDE_SENSOR:
-            diagonal[s.D_ATTITUDE] = variance
-        case s.POSITION_SENSOR:
-            diagonal[s.D_BIAS] = variance * (1.0 - motion)
-            follow = sensor.interval * FOLLOW_RATE_M_S
-            diagonal[s.D_POSITION] = sensor.use * sensor.jumped * motion * follow**2 * sensor.correlation
-        case _:
-            diagonal[s.D_VELOCITY] = variance * motion
-    return ca.sparsify(ca.diag(diagonal))
-
-
-def _inject(nominal: ca.SX, covariance: ca.SX, error: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _inject(nominal: ca.MX, covariance: ca.MX, error: ca.MX, markers: int) -> tuple[ca.MX, ca.MX]:
     """Nominal state with the error added, and the covariance of the error that is left (reset Jacobian)."""
-    rotations = [s.D_ATTITUDE]
-    rotations += [slice(k + 3, k + 6) for k in range(s.CORE_ERROR, error.shape[0], s.MARKER_ERROR)]
-    reset = ca.SX.eye(error.shape[0])
-    for rotation in rotations:
-        reset[rotation, rotation] = es.reset_jacobian(error[rotation])
-    covariance = up.symmetric(ca.mtimes(ca.mtimes(reset, covariance), reset.T))
-    return es.normalised(es.retract(nominal, error)), covariance
+    nominal, reset = _injected(markers)(nominal, error)
+    return nominal, up.symmetric(ca.mtimes(ca.mtimes(reset, covariance), reset.T))
 
 
 @lru_cache(maxsize=8)
 def injection(markers: int) -> ca.Function:
     """(nominal state, covariance, error) -> (nominal state with the error added, covariance of what is left)."""
     layout = s.Layout(markers)
-    nominal, error = ca.SX.sym("nominal", layout.nominal_size), ca.SX.sym("error", layout.errors)
-    covariance = ca.SX.sym("covariance", layout.errors, layout.errors)
-    return _function(f"injection_{markers}", [nominal, covariance, error], [*_inject(nominal, covariance, error)])
+    nominal, error = ca.MX.sym("nominal", layout.nominal_size), ca.MX.sym("error", layout.errors)
+    covariance = ca.MX.sym("covariance", layout.errors, layout.errors)
+    return _function(
+        f"injection_{markers}", [nominal, covariance, error], [*_inject(nominal, covariance, error, markers)]
+    )
 
 
 @lru_cache(maxsize=8)
-def compiled_accelerometer_step(markers: int) -> ca.Function:
-    """`accelerometer_step`, compiled where that can be had."""
-    return native.compiled([accelerometer_step(markers)], f"accelerometer{markers}")[0]
+def steps(markers: int) -> tuple[ca.Function, ca.Function, ca.Function]:
+    """`prediction`, `odometry_step` and `accelerometer_step`, as they are generated."""
+    return prediction(markers), odometry_step(markers), accelerometer_step(markers)
 
 
 @lru_cache(maxsize=8)
-def compiled_steps(markers: int) -> tuple[ca.Function, ca.Function]:
-    """`prediction` and `odometry_step`, compiled where that can be had (some seconds, once a computer)."""
-    step, odometry = native.compiled([prediction(markers), odometry_step(markers)], f"observer{markers}")
-    return step, odometry
+def compiled_steps(markers: int) -> tuple[ca.Function, ca.Function, ca.Function]:
+    """`steps`, compiled where that can be had (a second or two, once a computer), into one library: they share code."""
+    step, odometry, accelerometer = native.compiled(steps(markers), f"observer{markers}")
+    return step, odometry, accelerometer
 
 
 @lru_cache(maxsize=1)

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from uasfly.airframe import GRAVITY_M_S2, Airframe
+from uasfly.airframe import Airframe
 from uasfly.messages import Array
 from uasfly.observer import functions
 from uasfly.observer import states as s
@@ -91,13 +91,9 @@ class Stepper:
             in_flight: takes some tenths of a second; otherwise they are compiled, which may take some seconds.
         """
         if markers not in self._predictions:
-            generated = functions.prediction(markers), functions.odometry_step(markers)
-            predict, update = generated if in_flight else functions.compiled_steps(markers)
-            self._predictions[markers] = functions.Caller(predict)
-            self._odometry_steps[markers] = functions.Caller(update)
-            if self._noise.accelerometer_sigma_m_s2 is not None:
-                step = functions.accelerometer_step if in_flight else functions.compiled_accelerometer_step
-                self._accelerometer_steps[markers] = functions.Caller(step(markers))
+            generated = functions.steps(markers) if in_flight else functions.compiled_steps(markers)
+            calls = [functions.Caller(step) for step in generated]
+            self._predictions[markers], self._odometry_steps[markers], self._accelerometer_steps[markers] = calls
 
     def start(self, odometry: Odometry, airborne: bool) -> Moment:
         """The first moment, from a complete odometry sample: force, GNSS bias and wanders zero.
@@ -341,11 +337,6 @@ def correlation_factor(interval_s: float, correlation_s: float) -> float:
     taking them for noise would only blind the filter to the wind. For those leave the correlation at 0.
     """
     return 1.0 / math.tanh(0.5 * interval_s / correlation_s) if correlation_s > 0.0 else 1.0
-
-
-def hover_thrust_history(airframe: Airframe) -> ThrustHistory:
-    """Empty thrust history of an airframe: before the first command it hovers."""
-    return ThrustHistory(airframe.model.thrust_acts_after_s, GRAVITY_M_S2)
 
 
 def _without_force(moment: Moment) -> Array:

@@ -16,7 +16,11 @@ jump that stays raises it geometrically until it is let in.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import casadi as ca
+
+from uasfly.observer.matrices import Matrix, by_numbers
 
 # chi-square, 0.995 quantile
 GATE_3 = 12.838156466598651
@@ -31,13 +35,15 @@ SIGMA_FACTOR_MAX = 1e4
 CORRELATION_MAX = 0.49
 
 
-def symmetric(matrix: ca.SX) -> ca.SX:
+def symmetric(matrix: Matrix) -> Matrix:
     """The upper triangle of a square matrix, mirrored."""
     return ca.triu2symm(ca.triu(matrix))
 
 
-def inverse_of_symmetric_3(matrix: ca.SX) -> ca.SX:
+def inverse_of_symmetric_3(matrix: Matrix) -> Matrix:
     """Inverse (3, 3) of a symmetric positive definite (3, 3)."""
+    if isinstance(matrix, ca.MX):
+        return _inverse()(matrix)
     a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
     d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]
     c00, c01, c02 = d * f - e * e, c * e - b * f, b * e - c * d
@@ -45,6 +51,11 @@ def inverse_of_symmetric_3(matrix: ca.SX) -> ca.SX:
     determinant = a * c00 + b * c01 + c * c02
     rows = ((c00, c01, c02), (c01, c11, c12), (c02, c12, c22))
     return ca.vertcat(*(ca.horzcat(*row) for row in rows)) / determinant
+
+
+@lru_cache(maxsize=1)
+def _inverse() -> ca.Function:
+    return by_numbers("inverse", lambda numbers: [inverse_of_symmetric_3(numbers)], (3, 3))
 
 
 def bounded(matched: ca.SX, variance: ca.SX) -> ca.SX:
@@ -81,7 +92,7 @@ def matched_covariance(matched: ca.SX, noise: ca.SX, inverse: ca.SX, shortened: 
     return symmetric(matched + weight * (sample - matched))
 
 
-def joseph_update(covariance: ca.SX, jacobian: ca.SX, noise: ca.SX, allowed: ca.SX) -> tuple[ca.SX, ca.SX]:
+def joseph_update(covariance: Matrix, jacobian: Matrix, noise: Matrix, allowed: Matrix) -> tuple[Matrix, Matrix]:
     """Gain K (n, 3) and covariance (I - K H) P (I - K H)' + K R K' (n, n) after the update.
 
     The Joseph form holds for any gain, so that a state can be held without lying about its uncertainty (Schmidt 1966).

@@ -2,7 +2,10 @@
 
 As in `force_kernel` the force is a random walk whose integral is seen with white noise; here it is also seen itself, by
 an accelerometer with white noise and an unknown constant bias. The accelerometer tells what is fast, the integral what
-is slow. So the force is known almost at once about as well as the integral alone knows it a third of a second later.
+is slow. So the force is known at once, about as well as the integral alone knows it a third of a second later.
+
+Two samples of hindsight would take a tenth to a third off the error, and gusts, which change meanwhile, would more than
+give it back: at 9 m/s the wind that is shown errs by 0.71 m/s without and by 0.83 m/s with it.
 """
 
 from __future__ import annotations
@@ -18,11 +21,9 @@ from uasfly.wind.force_kernel import SAMPLES, STEP_S, UNKNOWN, VELOCITY_NOISE_M_
 FELT_STEP_S = 0.02
 FELT_SAMPLES = SAMPLES // 2
 BIAS_M_S2 = 0.05  # sigma of what PX4's estimator leaves of the accelerometer's bias
-DIRECT_LAG_S = 2 * FELT_STEP_S  # two samples of hindsight take a tenth to a third off the error
 LEAST_SIGMA_M_S2 = 0.03
 _TIMES: Array = np.arange(SAMPLES, dtype=np.float64) * STEP_S
 _FELT: Array = _TIMES[-1] - np.arange(FELT_SAMPLES, dtype=np.float64)[::-1] * FELT_STEP_S
-_TOLD = float(_TIMES[-1]) - DIRECT_LAG_S
 LEVELS = 5  # of the accelerometer's noise, a factor of two apart: to 0.48 m/s^2; a noisier one is not worth its trouble
 
 
@@ -62,7 +63,7 @@ def direct_kernel(density: float, level: int) -> DirectKernel:
     left = 1.0 - float(of_integral @ _TIMES) - float(weights[SAMPLES:].sum())
     of_felt: Array = weights[SAMPLES:] + left / FELT_SAMPLES  # a steady force comes out as it is
     weights = np.concatenate((of_integral, of_felt))
-    walked = squared * (_TOLD - 2.0 * float(weights @ told) + float(weights @ seen @ weights))
+    walked = squared * (float(_TIMES[-1]) - 2.0 * float(weights @ told) + float(weights @ seen @ weights))
     return DirectKernel(of_integral, of_felt, walked + float(weights @ noise @ weights))
 
 
@@ -72,7 +73,7 @@ def _walk() -> tuple[Array, Array]:
     earlier = np.minimum.outer(_TIMES, _TIMES)
     product, total = np.multiply.outer(_TIMES, _TIMES), np.add.outer(_TIMES, _TIMES)
     integrals = product * earlier - total * earlier**2 / 2.0 + earlier**3 / 3.0
-    forces = np.append(_FELT, _TOLD)
+    forces = np.append(_FELT, _TIMES[-1])
     passed = np.minimum.outer(_TIMES, forces)
     mixed = _TIMES[:, None] * passed - passed**2 / 2.0
     among = np.minimum.outer(_FELT, forces)

@@ -21,7 +21,7 @@ import numpy as np
 
 from uasfly.airframe import GRAVITY_M_S2, Limits, WindSettings
 from uasfly.messages import AccelerometerSample, Array, OdometrySample, Sample, StateEstimate
-from uasfly.wind.direct_kernel import DIRECT_LAG_S, LEVELS, direct_kernel, level_of
+from uasfly.wind.direct_kernel import LEVELS, direct_kernel, level_of
 from uasfly.wind.drag_curve import DragCurve
 from uasfly.wind.felt_force import LONGEST_GAP_S, FeltForce
 from uasfly.wind.force_kernel import LAG_S, SAMPLES, STEP_S, WINDOW_S, ForceKernel, kernels
@@ -151,7 +151,7 @@ class WindMeter:
         return self._tell(then_s, force, slope, speed, worst, variance, k_thrust_m_s2)
 
     def _force_now(self, end_s: float, density: float) -> tuple[float, Pair, float] | None:
-        """Time, force and its variance DIRECT_LAG_S ago, with the accelerometer; None where it tells too little."""
+        """Time, force and its variance at the accelerometer's newest sample; None where it tells too little."""
         newest_s = self._felt.newest_s(end_s)
         level = None if newest_s is None else level_of(self._felt.sigma_m_s2(density))
         if newest_s is None or level is None or newest_s - WINDOW_S < self._times[0]:
@@ -161,10 +161,10 @@ class WindMeter:
         if np.abs(felt.mean(axis=0) - (integral[-1] - integral[0]) / WINDOW_S).max() > CONTRADICTION_M_S2:
             return None
         east, north = (kernel.of_integral @ integral + kernel.of_felt @ felt).tolist()
-        return newest_s - DIRECT_LAG_S, (east, north), kernel.variance
+        return newest_s, (east, north), kernel.variance
 
     def _force_then(self, end_s: float, kernel: ForceKernel) -> tuple[float, Pair, float]:
-        """The same LAG_S ago, without it."""
+        """The same LAG_S ago, without the accelerometer."""
         east, north = (float(kernel.weights @ self._on_grid(self._integral[:, axis], end_s)) for axis in range(2))
         return end_s - LAG_S, (east, north), kernel.variance
 
