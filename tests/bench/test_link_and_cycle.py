@@ -8,11 +8,13 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from tests.control.vehicle import f550
+from uasfly.airframe import Airframe
 from uasfly.bench.cycle import Watcher
 from uasfly.bench.link_relay import RoundTrips, message_ids
 from uasfly.bench.observer import measure_observer
 from uasfly.drivers.watching import Cycle
 from uasfly.messages import Phase
+from uasfly.observer import Observer
 
 
 def _packed(message: dialect.MAVLink_message) -> bytes:
@@ -65,11 +67,11 @@ def test_the_observer_takes_all_that_it_is_measured_with(monkeypatch: pytest.Mon
 
     made = []
 
-    class Kept(bench.Observer):
+    class Kept(Observer):
         """Remembers who was made."""
 
-        def __init__(self, *arguments: object, **named: object) -> None:
-            super().__init__(*arguments, **named)  # type: ignore[arg-type]
+        def __init__(self, airframe: Airframe, prepared_markers: int = 0) -> None:
+            super().__init__(airframe, prepared_markers)
             made.append(self)
 
     monkeypatch.setattr(bench, "Observer", Kept)

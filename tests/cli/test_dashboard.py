@@ -154,7 +154,7 @@ def test_the_age_of_the_marker_is_told_where_a_mission_hangs_on_one() -> None:
         ({"phase": Phase.ABORTED, "reason": "stopped by Ctrl-C"}, "ABORTED", "red"),
     ],
 )
-def test_state_has_a_word_and_a_colour(changes: dict[str, object], word: str, colour: str) -> None:
+def test_state_has_a_word_and_a_colour(changes: dict[str, Any], word: str, colour: str) -> None:
     """In the banner of the full picture and in the first line of the small one."""
     of = scene(status(**changes))
     assert (headline(of.status).word, headline(of.status).colour) == (word, colour)

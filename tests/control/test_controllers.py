@@ -195,6 +195,7 @@ def test_without_a_timer_nothing_is_measured(controller: Controller) -> None:
 def test_a_timer_measures_the_solver(controller: Controller) -> None:
     """With a clock of 1 ms a look the measured time is a few of them."""
     ticks = iter(range(10**6))
+    assert isinstance(controller, NmpcController | PidController | PidDdController)
     measured = type(controller)(AIRFRAME, timer=lambda: 1e-3 * next(ticks))
     measured.reset(0.0, None)
     assert measured.step(0.0, _vehicle().estimate(np.zeros(3)), HERE, None).solve_ms == pytest.approx(1.0)

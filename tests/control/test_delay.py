@@ -36,7 +36,8 @@ def test_the_prediction_is_where_an_independent_vehicle_arrives(delay_s: float) 
     predictions = []
     for cycle in range(20):
         vehicle.time_s = cycle * 0.02
-        setpoint = _setpoint(vehicle.time_s, *rng.uniform(-0.3, 0.3, 2), rng.uniform(0.25, 0.45))
+        roll, pitch = rng.uniform(-0.3, 0.3, 2)
+        setpoint = _setpoint(vehicle.time_s, roll, pitch, rng.uniform(0.25, 0.45))
         acts_s = vehicle.time_s + delay_s
         state, _ = predictor.predict(_state(vehicle), vehicle.yaw, vehicle.yaw_rate, parameters, vehicle.time_s, acts_s)
         predictions.append((acts_s, state))

@@ -84,7 +84,7 @@ def test_the_jacobian_agrees_with_finite_differences(parameters: Array) -> None:
 
         others = (parameters, force, yaw, rate, length, following)
 
-        def defect(point: Array, others: tuple[object, ...] = others) -> Array:
+        def defect(point: Array, others: tuple[Array | float, ...] = others) -> Array:
             return np.asarray(linearise(point[:STATES], point[STATES:], *others)[0]).ravel()
 
         point = np.concatenate((state, inputs))

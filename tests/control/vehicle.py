@@ -133,7 +133,7 @@ class PointMass:
             math.cos(self.pitch) * math.cos(self.roll),
         )
         drag = np.array(self.airframe.model.drag_1_s) * velocity
-        return thrust * np.array(direction) - drag - np.array((0.0, 0.0, GRAVITY)) + force
+        return np.asarray(thrust * np.array(direction) - drag - np.array((0.0, 0.0, GRAVITY)) + force)
 
     def estimate(self, force: Array) -> StateEstimate:
         """The truth as an estimate, with a force estimate."""

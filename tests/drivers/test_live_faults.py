@@ -200,7 +200,10 @@ def test_a_terminal_that_takes_nothing_costs_neither_time_nor_memory() -> None:
     view = BackgroundWatch(watch)
     for k in range(10 * BACKLOG):
         texts: Any = ((4, "gust"),) if k == 10 * BACKLOG - 1 else ()
-        view(Status(0.02 * k, Phase.LEGS, 0, True, 0.5, None, None, announcements=texts), None)
+        view(
+            Status(0.02 * k, Phase.LEGS, 0, True, 0.5, None, None, announcements=texts),
+            Cycle(sent=True, cycle_ms=1.0, solve_ms=None),
+        )
     stuck.set()
     view.close()
     assert len(taken) <= BACKLOG + 3

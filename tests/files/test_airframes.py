@@ -20,13 +20,13 @@ def airframe(name: str) -> Airframe:
     return load_file(find_file("airframe", name), Airframe)
 
 
-def test_the_four_airframes_are_shipped():
+def test_the_four_airframes_are_shipped() -> None:
     """Neither more nor less than the documentation says."""
     assert tuple(shipped_names("airframe")) == NAMES
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_file_and_airframe_have_one_name_and_a_plant(name):
+def test_file_and_airframe_have_one_name_and_a_plant(name: str) -> None:
     """The plant is a shipped one of the same mass and rotor count."""
     frame = airframe(name)
     plant = load_file(find_file("plant", frame.plant), Plant)
@@ -43,20 +43,20 @@ def test_file_and_airframe_have_one_name_and_a_plant(name):
         ("iris", 0.7081),
     ],
 )
-def test_the_papers_airframes_hover_where_the_paper_says(name, hover):
+def test_the_papers_airframes_hover_where_the_paper_says(name: str, hover: float) -> None:
     """k_thrust is the paper's."""
     assert airframe(name).model.hover_thrust == pytest.approx(hover, abs=1e-4)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_limits_hold_the_wind_that_they_name_with_a_margin(name):
+def test_the_limits_hold_the_wind_that_they_name_with_a_margin(name: str) -> None:
     """Unlike the paper's +-0.1 rad, which its own blower overpowers."""
     frame = airframe(name)
     assert check_airframe(frame) == []
     assert hover_wind_limit_m_s(frame) > frame.limits.wind_m_s
 
 
-def test_the_f550_holds_the_strongest_jet_in_all_directions():
+def test_the_f550_holds_the_strongest_jet_in_all_directions() -> None:
     """14.8 m/s push with 0.0155 v^2 = 3.4 m/s^2; a third of the tilt is left."""
     frame = airframe("f550")
     push = 0.0155 * 14.8**2
@@ -67,7 +67,7 @@ def test_the_f550_holds_the_strongest_jet_in_all_directions():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_backup_pids_are_stable_with_the_airframes_lag_and_delay(name):
+def test_the_backup_pids_are_stable_with_the_airframes_lag_and_delay(name: str) -> None:
     """The loop gain crosses one once, 45 degrees and 10 dB are spare; 30 ms are added for estimation."""
     frame = airframe(name)
     s = 1j * np.logspace(-3, 2, 50_000)
@@ -82,7 +82,7 @@ def test_the_backup_pids_are_stable_with_the_airframes_lag_and_delay(name):
         assert np.abs(loop[turned[0]]) < 10 ** (-10 / 20)
 
 
-def test_an_airframe_that_cannot_hold_its_wind_is_told():
+def test_an_airframe_that_cannot_hold_its_wind_is_told() -> None:
     """The answer names what can be held."""
     frame = airframe("f550")
     strong = frame.model_copy(update={"limits": frame.limits.model_copy(update={"wind_m_s": 20.0})})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from uasfly import files
 from uasfly.airframe import Airframe
 from uasfly.errors import FileError
 from uasfly.files import find_file, load_file, parse_overrides, shipped_names, top_level_fields, write_schema
-from uasfly.mission import Mission
+from uasfly.mission import CircleLeg, HoverLeg, Mission
 
 MISSION = """\
 name: test
@@ -28,8 +29,11 @@ legs:
 """
 
 
+Writer = Callable[[str], Path]
+
+
 @pytest.fixture
-def write(tmp_path):
+def write(tmp_path: Path) -> Writer:
     """Writes a text to a file and gives its path."""
 
     def write_text(text: str) -> Path:
@@ -48,11 +52,13 @@ def problems(path: Path, overrides: list[str] | None = None, model: type = Missi
     return caught.value.problems
 
 
-def test_a_file_becomes_the_model(write):
+def test_a_file_becomes_the_model(write: Writer) -> None:
     """Whole numbers are numbers, lists are tuples."""
-    mission = load_file(write(MISSION), Mission)
-    assert mission.legs[0].position_m == (0.0, 0.0, 1.5)
-    assert mission.legs[1].radius_m == 1.0
+    hover, circle = load_file(write(MISSION), Mission).legs
+    assert isinstance(hover, HoverLeg)
+    assert hover.position_m == (0.0, 0.0, 1.5)
+    assert isinstance(circle, CircleLeg)
+    assert circle.radius_m == 1.0
 
 
 @pytest.mark.parametrize(
@@ -85,24 +91,26 @@ def test_a_file_becomes_the_model(write):
         ("name: test", "name: test\nyaw: {rule: facing}", "line 2: yaw.point_m is missing; expected a list of two"),
     ],
 )
-def test_a_problem_names_line_field_expectation_finding_and_mend(write, old, new, expected):
+def test_a_problem_names_line_field_expectation_finding_and_mend(
+    write: Writer, old: str, new: str, expected: str
+) -> None:
     """What is wrong can be mended without opening the manual."""
     assert expected in "\n".join(problems(write(MISSION.replace(old, new))))
 
 
-def test_all_problems_come_at_once_and_none_is_invented(write):
+def test_all_problems_come_at_once_and_none_is_invented(write: Writer) -> None:
     """Two wrong legs are two problems; that no valid leg is left is not a third."""
     text = MISSION.replace("duration_s: 10", "duration_s: -1").replace("radius_m: 1", "radius_m: -1")
     assert [problem.split(":")[0] for problem in problems(write(text))] == ["line 6", "line 9"]
 
 
 @pytest.mark.parametrize("text", ["- a\n- b", "just text", "null", "3"])
-def test_a_file_that_is_no_mapping_says_what_it_is(write, text):
+def test_a_file_that_is_no_mapping_says_what_it_is(write: Writer, text: str) -> None:
     """The outermost level holds fields."""
     assert "expected a mapping of fields" in problems(write(text))[0]
 
 
-def test_files_that_cannot_be_read_say_why(tmp_path):
+def test_files_that_cannot_be_read_say_why(tmp_path: Path) -> None:
     """Missing, a directory, a pipe, not UTF-8, too large."""
     assert problems(tmp_path / "none.yaml") == ["there is no such file"]
     assert "is a directory" in problems(tmp_path)[0]
@@ -117,19 +125,22 @@ def test_files_that_cannot_be_read_say_why(tmp_path):
     assert "larger than" in problems(large)[0]
 
 
-def test_a_byte_order_mark_does_no_harm(tmp_path):
+def test_a_byte_order_mark_does_no_harm(tmp_path: Path) -> None:
     """Editors on Windows write one."""
     path = tmp_path / "mark.yaml"
     path.write_bytes(b"\xef\xbb\xbf" + MISSION.encode())
     assert load_file(path, Mission).name == "test"
 
 
-def test_set_changes_fields_items_and_sections_that_are_not_there(write):
+def test_set_changes_fields_items_and_sections_that_are_not_there(write: Writer) -> None:
     """Dotted names, list indices, YAML values."""
     flags = ["legs[0].position_m[2]=2", "legs[1].direction=clockwise", "limits.geofence.radius_m=7", "yaw={rule: path}"]
     mission = load_file(write(MISSION), Mission, parse_overrides(flags))
-    assert mission.legs[0].position_m == (0.0, 0.0, 2.0)
-    assert mission.legs[1].direction == "clockwise"
+    hover, circle = mission.legs
+    assert isinstance(hover, HoverLeg)
+    assert hover.position_m == (0.0, 0.0, 2.0)
+    assert isinstance(circle, CircleLeg)
+    assert circle.direction == "clockwise"
     assert mission.limits.geofence is not None
     assert mission.limits.geofence.radius_m == 7.0
     assert mission.yaw.rule == "path"
@@ -148,13 +159,13 @@ def test_set_changes_fields_items_and_sections_that_are_not_there(write):
         ("takeoff[0]=3", "--set takeoff[0]: expected takeoff to be a list, found a block of fields"),
     ],
 )
-def test_a_wrong_set_is_refused_by_its_key(write, flag, expected):
+def test_a_wrong_set_is_refused_by_its_key(write: Writer, flag: str, expected: str) -> None:
     """The flag is named, not a line of the file that the user did not write."""
     (problem,) = problems(write(MISSION), [flag])
     assert problem.startswith(expected)
 
 
-def test_a_scalar_does_not_silently_fill_a_triple():
+def test_a_scalar_does_not_silently_fill_a_triple() -> None:
     """model.drag_1_s=0.3 could mean three axes or a forgotten bracket: it is refused."""
     (problem,) = problems(find_file("airframe", "f550"), ["model.drag_1_s=0.3"], Airframe)
     assert "model.drag_1_s: expected a list of three numbers" in problem
@@ -162,32 +173,32 @@ def test_a_scalar_does_not_silently_fill_a_triple():
     assert changed.model.drag_1_s == (0.3, 0.3, 0.3)
 
 
-def test_a_rule_between_fields_names_both():
+def test_a_rule_between_fields_names_both() -> None:
     """Limits that do not hold hover are refused with the figures."""
     (problem,) = problems(find_file("airframe", "f550"), ["limits.thrust_max=0.3"], Airframe)
     assert "hover thrust 0.344" in problem
 
 
 @pytest.mark.parametrize("flag", ["x", "=3", "a..b=1", "a[b]=1", "legs[0]x=3", ".a=1", "a.=3", "a]=1", "[0]=1"])
-def test_a_flag_without_a_readable_key_is_refused(flag):
+def test_a_flag_without_a_readable_key_is_refused(flag: str) -> None:
     """The message shows how a key looks."""
     with pytest.raises(FileError, match=r"expected (key=value|names joined by dots)"):
         parse_overrides([flag])
 
 
-def test_a_flag_with_a_value_that_is_no_yaml_is_refused():
+def test_a_flag_with_a_value_that_is_no_yaml_is_refused() -> None:
     """The key is named, and the place in the value."""
     with pytest.raises(FileError, match=r"--set a: line 1, column 3: not valid YAML"):
         parse_overrides(["a=[1"])
 
 
-def test_values_of_flags_are_yaml():
+def test_values_of_flags_are_yaml() -> None:
     """An empty value is nothing, as in a file; an equals sign may stand in a value."""
     overrides = parse_overrides(["a.b=25", "c=[1, 2]", "d=land", "e=", "f=x=y"])
     assert overrides == {"a.b": 25, "c": [1, 2], "d": "land", "e": None, "f": "x=y"}
 
 
-def test_names_are_found_in_any_spelling_and_paths_first(tmp_path, monkeypatch):
+def test_names_are_found_in_any_spelling_and_paths_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A name may be written with dashes; a file of that name in the working directory wins."""
     monkeypatch.chdir(tmp_path)
     shipped = find_file("mission", "back_and_forth")
@@ -213,7 +224,7 @@ def test_names_are_found_in_any_spelling_and_paths_first(tmp_path, monkeypatch):
         ("/", "it is a directory"),
     ],
 )
-def test_what_is_not_there_is_refused_with_the_names_there_are(name, expected):
+def test_what_is_not_there_is_refused_with_the_names_there_are(name: str, expected: str) -> None:
     """Whatever was typed, the answer lists what could have been."""
     with pytest.raises(FileError) as caught:
         find_file("airframe", name)
@@ -222,7 +233,7 @@ def test_what_is_not_there_is_refused_with_the_names_there_are(name, expected):
     assert "(shipped airframes: aurelia_x6, f550, iris, px4_sih)" in problem
 
 
-def test_other_folders_can_be_searched_instead(tmp_path):
+def test_other_folders_can_be_searched_instead(tmp_path: Path) -> None:
     """The first folder that has the name gives the file."""
     first, second = tmp_path / "first", tmp_path / "second"
     for folder in (first, second):
@@ -233,7 +244,7 @@ def test_other_folders_can_be_searched_instead(tmp_path):
     assert find_file("scenario", "one", [first, second]) == second / "one.yml"
 
 
-def test_an_installed_package_carries_its_files_inside(tmp_path, monkeypatch):
+def test_an_installed_package_carries_its_files_inside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where uasfly/data exists, it is used; in a checkout the folders lie beside the package."""
     inside = tmp_path / "uasfly" / "data" / "missions"
     inside.mkdir(parents=True)
@@ -245,7 +256,7 @@ def test_an_installed_package_carries_its_files_inside(tmp_path, monkeypatch):
     assert shipped_names("airframe") == ["beside"]
 
 
-def test_top_level_fields_tell_what_a_file_is(write):
+def test_top_level_fields_tell_what_a_file_is(write: Writer) -> None:
     """Names only; nothing is checked."""
     assert top_level_fields(write(MISSION)) == {"name", "takeoff", "legs"}
     with pytest.raises(FileError, match="expected a mapping"):
@@ -253,7 +264,7 @@ def test_top_level_fields_tell_what_a_file_is(write):
 
 
 @pytest.mark.parametrize("model", [Mission, Airframe])
-def test_a_schema_says_which_draft_it_is_and_refuses_unknown_fields(model):
+def test_a_schema_says_which_draft_it_is_and_refuses_unknown_fields(model: type[Mission | Airframe]) -> None:
     """Editors need both."""
     schema = write_schema(model)
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
@@ -262,7 +273,7 @@ def test_a_schema_says_which_draft_it_is_and_refuses_unknown_fields(model):
     assert "name" in schema["required"]
 
 
-def test_a_file_of_nothing_but_mistakes_names_the_first_of_them(write):
+def test_a_file_of_nothing_but_mistakes_names_the_first_of_them(write: Writer) -> None:
     """Looking for a like name takes its time, and nobody reads a thousand problems."""
     text = MISSION + "".join(f"raduis_{number}: 1\n" for number in range(3000))
     found = problems(write(text))
@@ -271,14 +282,14 @@ def test_a_file_of_nothing_but_mistakes_names_the_first_of_them(write):
     assert found[-1] == "and more than 30 problems in all; mend these first"
 
 
-def test_an_error_cannot_reach_the_terminal(write):
+def test_an_error_cannot_reach_the_terminal(write: Writer) -> None:
     """What a file holds is shown with its escapes, not carried out."""
     (problem,) = problems(write(MISSION + '"\\e[2J\\u202e": 1\n'))
     assert "\\x1b[2J\\u202e is not a known field" in problem
 
 
 @pytest.mark.parametrize("key", [f"legs[{'9' * 5000}]", "legs[1234567]", "legs[²]"])
-def test_an_index_of_any_length_is_no_index(key):
+def test_an_index_of_any_length_is_no_index(key: str) -> None:
     """Python refuses to read whole numbers of thousands of digits."""
     with pytest.raises(FileError, match="is not the path of a field") as caught:
         parse_overrides([f"{key}=1"])
@@ -287,9 +298,9 @@ def test_an_index_of_any_length_is_no_index(key):
 
 @pytest.mark.parametrize("value", ["1.0e-300", "5.0e-324", "0.00005"])
 @pytest.mark.parametrize("field", ["duration_s: 10", "radius_m: 1", "speed_m_s: 0.5"])
-def test_a_figure_too_small_to_fly_by_is_refused(write, field, value):
+def test_a_figure_too_small_to_fly_by_is_refused(write: Writer, field: str, value: str) -> None:
     """Its reciprocal overflows; it was a slip."""
-    name = field.split(":")[0]
+    name = field.split(":", maxsplit=1)[0]
     (problem,) = problems(write(MISSION.replace(field, f"{name}: {value}")))
     assert "expected a number, above 0.0001" in problem
 
@@ -297,7 +308,7 @@ def test_a_figure_too_small_to_fly_by_is_refused(write, field, value):
 @pytest.mark.parametrize(
     "assignment", ["model.k_thrust_m_s2=1e200", "controller.weights.terminal=.inf", "mass_kg=1e300"]
 )
-def test_a_figure_too_large_to_reckon_with_is_refused(assignment):
+def test_a_figure_too_large_to_reckon_with_is_refused(assignment: str) -> None:
     """Its square overflows; k_thrust_m_s2 did so in `uasfly check`."""
     with pytest.raises(FileError, match="not above"):
         load_file(find_file("airframe", "f550"), Airframe, parse_overrides([assignment]))

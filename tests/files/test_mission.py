@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
@@ -26,13 +28,13 @@ CIRCLE = {"type": "circle", "center_m": (0, 0), "radius_m": 1.0, "height_m": 1.0
 EIGHT = {"type": "figure_eight", "center_m": (0, 0), "height_m": 1.0, "length_m": 2.0, "width_m": 1.0}
 
 
-def mission(**fields):
+def mission(**fields: object) -> Mission:
     """A mission of two hovers, with other fields as given."""
     hover = {"type": "hover", "position_m": (0, 0, 1), "duration_s": 1.0}
     return Mission.model_validate({"name": "m", "takeoff": {"height_m": 1.0}, "legs": [hover, dict(hover)], **fields})
 
 
-def test_a_minimal_mission_lands_where_it_stands():
+def test_a_minimal_mission_lands_where_it_stands() -> None:
     """What a file leaves out has a safe default."""
     plain = mission()
     assert plain.ending.action == "land"
@@ -41,7 +43,7 @@ def test_a_minimal_mission_lands_where_it_stands():
     assert plain.yaw == FixedYaw(yaw_deg=0.0)
 
 
-def test_a_leg_may_override_the_missions_yaw_rule():
+def test_a_leg_may_override_the_missions_yaw_rule() -> None:
     """The other legs keep the mission's."""
     legs = [
         {"type": "hover", "position_m": (0, 0, 1), "duration_s": 1.0, "yaw": {"rule": "facing", "point_m": (1, 2)}},
@@ -52,7 +54,7 @@ def test_a_leg_may_override_the_missions_yaw_rule():
     assert flight.yaw_rule(1) == PathYaw(rule="path")
 
 
-def test_degrees_in_the_file_are_radians_behind():
+def test_degrees_in_the_file_are_radians_behind() -> None:
     """The property is what code uses."""
     assert FixedYaw(yaw_deg=90.0).yaw_rad == pytest.approx(math.pi / 2)
 
@@ -65,7 +67,9 @@ def test_degrees_in_the_file_are_radians_behind():
         (FigureEightLeg, EIGHT, {"speed_m_s": 1.0, "period_s": 6.0}),
     ],
 )
-def test_exactly_one_of_two_ways_to_say_it(model, base, pair):
+def test_exactly_one_of_two_ways_to_say_it(
+    model: type[BackAndForthLeg | CircleLeg | FigureEightLeg], base: Mapping[str, object], pair: Mapping[str, float]
+) -> None:
     """Both would contradict each other, neither says nothing."""
     for name, value in pair.items():
         model.model_validate({**base, name: value})
@@ -75,38 +79,38 @@ def test_exactly_one_of_two_ways_to_say_it(model, base, pair):
         model.model_validate(base)
 
 
-def test_a_track_needs_two_ends():
+def test_a_track_needs_two_ends() -> None:
     """Start and end at one point are no track."""
     with pytest.raises(ValidationError, match="must be apart"):
         BackAndForthLeg.model_validate({**TRACK, "end_m": TRACK["start_m"], "passes": 1})
 
 
-def test_altitude_limits_are_in_order():
+def test_altitude_limits_are_in_order() -> None:
     """The lower one is the minimum."""
     with pytest.raises(ValidationError, match="altitude_min_m must be below"):
         MissionLimits(altitude_min_m=5.0, altitude_max_m=2.0)
 
 
-def test_waypoints_need_two_points():
+def test_waypoints_need_two_points() -> None:
     """One point is a hover."""
     with pytest.raises(ValidationError):
         WaypointsLeg.model_validate({"type": "waypoints", "points": [{"position_m": (0, 0, 1)}]})
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e6])
-def test_points_are_finite_and_near(value):
+def test_points_are_finite_and_near(value: float) -> None:
     """A coordinate of a thousand kilometres is a slip of the pen."""
     with pytest.raises(ValidationError):
         mission(legs=[{"type": "hover", "position_m": (value, 0, 1), "duration_s": 1.0}])
 
 
-def test_a_mission_survives_its_own_json():
+def test_a_mission_survives_its_own_json() -> None:
     """What the log stores is the mission again."""
     original = mission(limits={"geofence": {"radius_m": 5.0}}, yaw={"rule": "path"})
     assert Mission.model_validate_json(original.model_dump_json()) == original
 
 
-def test_a_marker_and_its_frame_belong_together():
+def test_a_marker_and_its_frame_belong_together() -> None:
     """One without the other is a slip; the rest has defaults."""
     hangs = mission(frame="marker", marker={"bundle": "four_36h11"})
     assert hangs.marker is not None
@@ -130,7 +134,9 @@ def test_a_marker_and_its_frame_belong_together():
         ({"timout_s": 5}, "timeout_s"),
     ],
 )
-def test_slips_in_the_block_of_the_marker_are_named(tmp_path, until_seen, expected):
+def test_slips_in_the_block_of_the_marker_are_named(
+    tmp_path: Path, until_seen: Mapping[str, object], expected: str
+) -> None:
     """With line, field and what was expected."""
     path = tmp_path / "m.yaml"
     block = "\n".join(f"    {key}: {value}" for key, value in until_seen.items())

@@ -12,7 +12,7 @@ from uasfly.airframe import Airframe
 from uasfly.files import find_file, load_file
 
 
-def test_lag_gain_and_dead_time_are_those_of_the_recorded_flight():
+def test_lag_gain_and_dead_time_are_those_of_the_recorded_flight() -> None:
     """Refitted from the log, they agree within 5 ms, 1 % and 5 ms; the model leaves 0.3 degrees of 4.5."""
     fit = fit_attitude_response(test_data("px4_recordings/excitation.ulg"))
     model = load_file(find_file("airframe", "px4_sih"), Airframe).model

@@ -19,7 +19,7 @@ def problems(text: str) -> list[str]:
     return caught.value.problems
 
 
-def test_scalars_follow_the_yaml_1_2_core_schema():
+def test_scalars_follow_the_yaml_1_2_core_schema() -> None:
     """Words of YAML 1.1 (no, on, octal 010, dates, underscores) are not turned into something else."""
     data = parse_yaml(
         "[1, -2, 010, 0x1F, 0o17, 1e3, .5, 1., null, ~, true, False, no, on, 2020-01-01, 1_000, '3', \"true\"]", "f"
@@ -28,15 +28,17 @@ def test_scalars_follow_the_yaml_1_2_core_schema():
     assert data == [*expected, "no", "on", "2020-01-01", "1_000", "3", "true"]
 
 
-def test_infinity_and_not_a_number_are_numbers():
+def test_infinity_and_not_a_number_are_numbers() -> None:
     """The special floats of YAML arrive as such, so that the checks behind can refuse them by name."""
-    infinite, negative, undefined = parse_yaml("[.inf, -.Inf, .nan]", "f").data  # type: ignore[misc]
+    numbers = parse_yaml("[.inf, -.Inf, .nan]", "f").data
+    assert isinstance(numbers, list)
+    infinite, negative, undefined = numbers
     assert infinite == math.inf
     assert negative == -math.inf
     assert math.isnan(undefined)
 
 
-def test_every_key_and_item_has_its_line():
+def test_every_key_and_item_has_its_line() -> None:
     """Lines count from 1; a path that is not in the text gets the line of what encloses it."""
     document = parse_yaml("# comment\na: 1\nb:\n  - x: 1\n    y: 2\n  -\n    x: 3\n", "f")
     assert document.line(("a",)) == 2
@@ -46,7 +48,7 @@ def test_every_key_and_item_has_its_line():
     assert document.line(("missing",)) == document.line(()) == 2
 
 
-def test_duplicate_keys_are_all_reported_with_both_lines():
+def test_duplicate_keys_are_all_reported_with_both_lines() -> None:
     """Neither value silently wins."""
     found = problems("a: 1\nb: {c: 1, c: 2}\na: 3\n")
     assert found == [
@@ -73,7 +75,7 @@ def test_duplicate_keys_are_all_reported_with_both_lines():
         ("a: " + "[" * 100, "line 1", "nested deeper"),
     ],
 )
-def test_what_no_file_needs_is_refused_with_its_place(text, where, what):
+def test_what_no_file_needs_is_refused_with_its_place(text: str, where: str, what: str) -> None:
     """Syntax errors, and the features of YAML that make files grow or run code."""
     (problem,) = problems(text)
     assert problem.startswith(where)
@@ -81,12 +83,12 @@ def test_what_no_file_needs_is_refused_with_its_place(text, where, what):
 
 
 @pytest.mark.parametrize("text", ["", "\n\n", "# only a comment\n"])
-def test_an_empty_file_says_so(text):
+def test_an_empty_file_says_so(text: str) -> None:
     """Nothing in it is not the same as a wrong field."""
     assert problems(text) == ["the file is empty; expected a mapping of fields"]
 
 
-def test_an_alias_bomb_is_refused_at_its_first_anchor():
+def test_an_alias_bomb_is_refused_at_its_first_anchor() -> None:
     """Nine lines that would grow to a billion items never do."""
     lines = ["a0: &a0 [x, x]"] + [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 9)]
     assert problems("\n".join(lines)) == ["line 1: anchor &a0: anchors are not used here; write the value out"]
@@ -94,7 +96,7 @@ def test_an_alias_bomb_is_refused_at_its_first_anchor():
 
 @given(st.text(alphabet="ab:-?[]{},#&*!|>'\"%@` \n\t0.\\\x00\x85\ud7ffé", max_size=60))
 @settings(max_examples=300, deadline=None)
-def test_any_text_gives_data_or_a_file_error(text):
+def test_any_text_gives_data_or_a_file_error(text: str) -> None:
     """No text makes the reader fail in another way."""
     try:
         parse_yaml(text, "f")
@@ -102,13 +104,13 @@ def test_any_text_gives_data_or_a_file_error(text):
         assert error.problems
 
 
-def test_paths_are_written_as_people_write_them():
+def test_paths_are_written_as_people_write_them() -> None:
     """Names are joined by dots, indices stand in brackets."""
     assert dotted(("legs", 2, "points", 0, "position_m")) == "legs[2].points[0].position_m"
 
 
 @pytest.mark.parametrize("line_break", ["\x85", "\u2028", "\u2029", "\r"])
-def test_a_problem_behind_an_odd_line_break_has_its_place(line_break):
+def test_a_problem_behind_an_odd_line_break_has_its_place(line_break: str) -> None:
     """The reader may count more lines than there are line feeds; looking for tabs in the last must not fail."""
     (problem,) = problems(f"a: 1{line_break * 3}b: [1, 2")
     assert problem.startswith("line 4, column 9" if line_break == "\r" else "line 1, column 9")
@@ -125,13 +127,13 @@ def test_a_problem_behind_an_odd_line_break_has_its_place(line_break):
         ("- a\nb: 1\n", "indent it like the lines"),
     ],
 )
-def test_wrong_syntax_says_how_to_mend_it(text, mend):
+def test_wrong_syntax_says_how_to_mend_it(text: str, mend: str) -> None:
     """The parser names its grammar; a person wants to know what to do."""
     (problem,) = problems(text)
     assert mend in problem
 
 
-def test_names_of_any_length_are_shown_by_their_beginning():
+def test_names_of_any_length_are_shown_by_their_beginning() -> None:
     """A key, a tag or an anchor may be as long as the file."""
     assert dotted(("x" * 5000, 1)) == "x" * 57 + "...[1]"
     assert dotted(("x\ny",)) == "x\\ny"

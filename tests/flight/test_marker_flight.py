@@ -102,7 +102,7 @@ def standoff(place: Array, quaternion: Array) -> Array:
     """(3,) m: where the mission wants to be."""
     out = rotation_matrix(quaternion)[:, 2]
     heading = math.atan2(out[1], out[0])
-    return place + np.array((4.2 * math.cos(heading), 4.2 * math.sin(heading), 0.2))
+    return np.asarray(place + np.array((4.2 * math.cos(heading), 4.2 * math.sin(heading), 0.2)))
 
 
 def test_it_searches_finds_and_flies_off_a_board_that_was_in_its_back() -> None:

@@ -206,7 +206,8 @@ def test_a_search_that_is_taken_over_and_given_back_waits_anew() -> None:
     flight.run(8.0)
     flight.mode = FlightMode.POSITION
     flight.run(4.0)
-    assert flight.phase is Phase.ENGAGE
+    engaging = flight.phase
+    assert engaging is Phase.ENGAGE
     flight.spotter.position = flight.spotter.position + np.array((1.0, 0.0, 0.0))
     flight.run(1.0)
     flight.mode = FlightMode.OFFBOARD
@@ -259,7 +260,8 @@ def test_a_lost_marker_holds_the_mission_until_it_is_back() -> None:
     flight.run(3.0)
     flight.spotter.seen = False
     flight.run(4.8)
-    assert flight.steps[-1].status.action is Action.NOTHING
+    undisturbed = flight.steps[-1].status
+    assert undisturbed.action is Action.NOTHING
     flight.run(2.2)
     assert flight.steps[-1].status.action is Action.HOLD
     assert any("the marker has not been seen for 5 s: holding" in text for text in flight.texts)

@@ -56,6 +56,10 @@ class Script:
     _queue: list[Sample] = field(default_factory=list)
     _airborne_at_s: float | None = None
 
+    def phase(self) -> Phase:
+        """The sequencer's; a type checker takes an attribute that was compared for unchanged, but not a call."""
+        return self.sequencer.phase
+
     def run(self, seconds: float) -> None:
         """Let cycles pass."""
         for _ in range(round(seconds / PERIOD_S)):
@@ -115,10 +119,10 @@ def test_nothing_is_armed_before_the_preflight_check_has_cleared_it() -> None:
     assert not script.sequencer.clearance.awaited
     script.run(20.0)
     assert script.sequencer.clearance.awaited
-    assert (script.sequencer.phase, script.asked) == (Phase.PREFLIGHT, [])
+    assert (script.phase(), script.asked) == (Phase.PREFLIGHT, [])
     script.sequencer.clear(script.time_s, "")
     script.run(PERIOD_S)
-    assert (script.sequencer.phase, script.asked) == (Phase.TAKEOFF, [RequestKind.ARM])
+    assert (script.phase(), script.asked) == (Phase.TAKEOFF, [RequestKind.ARM])
     assert not script.sequencer.clearance.awaited
 
 
@@ -128,7 +132,7 @@ def test_a_preflight_check_that_says_stop_arms_nothing() -> None:
     script.run(2.0)
     script.sequencer.clear(script.time_s, "no battery")
     script.run(5.0)
-    assert (script.sequencer.phase, script.sequencer.reason, script.asked) == (Phase.ABORTED, "no battery", [])
+    assert (script.phase(), script.sequencer.reason, script.asked) == (Phase.ABORTED, "no battery", [])
     assert not script.sequencer.hand_over
 
 
@@ -138,7 +142,7 @@ def test_a_mere_check_ends_when_it_is_cleared() -> None:
     script.run(2.0)
     script.sequencer.clear(script.time_s, "")
     script.run(5.0)
-    assert (script.sequencer.phase, script.sequencer.reason, script.asked) == (Phase.DONE, "", [])
+    assert (script.phase(), script.sequencer.reason, script.asked) == (Phase.DONE, "", [])
 
 
 def test_a_vehicle_that_becomes_unready_is_not_judged_meanwhile() -> None:
@@ -158,11 +162,11 @@ def test_a_vehicle_that_does_not_get_ready_is_judged_at_the_end() -> None:
     script = _checked()
     script.sigma_m = 9.0
     script.run(31.0)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert script.sequencer.clearance.awaited
     reason = script.sequencer.reason
     script.sequencer.clear(script.time_s, "much")
-    assert (script.sequencer.phase, script.sequencer.reason) == (Phase.ABORTED, reason)
+    assert (script.phase(), script.sequencer.reason) == (Phase.ABORTED, reason)
     assert not script.sequencer.clearance.awaited
     interrupted = _checked()
     interrupted.run(0.5)
@@ -177,17 +181,17 @@ def test_every_take_off_of_the_pilot_is_cleared_anew() -> None:
     script.run(2.0)
     script.sequencer.clear(script.time_s, "")
     script.run(PERIOD_S)
-    assert script.sequencer.phase is Phase.ENGAGE
+    assert script.phase() is Phase.ENGAGE
     script.armed = script.in_air = False
     script.run(2.0)
-    assert script.sequencer.phase is Phase.PREFLIGHT
+    assert script.phase() is Phase.PREFLIGHT
     assert script.sequencer.clearance.awaited
 
 
 def _in_legs(ending: EndingAction = EndingAction.LAND) -> Script:
     script = _script(ending=ending)
     script.run(12.0)
-    assert script.sequencer.phase is Phase.LEGS
+    assert script.phase() is Phase.LEGS
     return script
 
 
@@ -196,7 +200,7 @@ def test_an_undisturbed_flight_goes_through_every_phase() -> None:
     script = _in_legs()
     script.legs_done = True
     script.run(3.0)
-    assert script.sequencer.phase is Phase.DONE
+    assert script.phase() is Phase.DONE
     assert script.sequencer.reason == ""
     assert script.asked == [RequestKind.ARM, RequestKind.TAKEOFF, RequestKind.OFFBOARD, RequestKind.LAND]
 
@@ -208,7 +212,7 @@ def test_nothing_is_streamed_before_engaging_and_after_landing() -> None:
     for _ in range(1000):
         script.legs_done = script.time_s > 15.0
         script.run(PERIOD_S)
-        streamed.setdefault(script.sequencer.phase, set()).add(script.sequencer.streaming)
+        streamed.setdefault(script.phase(), set()).add(script.sequencer.streaming)
     assert streamed[Phase.PREFLIGHT] == {False}
     assert streamed[Phase.TAKEOFF] == {False}
     assert True in streamed[Phase.LEGS]
@@ -224,7 +228,7 @@ def test_the_mission_says_how_it_ends(ending: EndingAction, kind: RequestKind) -
     script.legs_done = True
     script.run(3.0)
     assert script.asked[-1] is kind
-    assert script.sequencer.phase is Phase.DONE
+    assert script.phase() is Phase.DONE
 
 
 def test_the_pilot_switching_away_has_the_vehicle_at_once() -> None:
@@ -234,14 +238,14 @@ def test_the_pilot_switching_away_has_the_vehicle_at_once() -> None:
     asked = len(script.asked)
     script.mode = FlightMode.POSITION
     script.run(0.1)
-    assert script.sequencer.phase is Phase.ENGAGE
+    assert script.phase() is Phase.ENGAGE
     assert script.sequencer.taken_over
     assert script.sequencer.pilot_flies
     assert not script.sequencer.in_offboard
     assert any("left offboard for position: the pilot" in text for text in script.texts)
     script.run(30.0)
     assert len(script.asked) == asked
-    assert script.sequencer.phase is Phase.ENGAGE
+    assert script.phase() is Phase.ENGAGE
 
 
 @pytest.mark.parametrize("times", [1, 3])
@@ -254,14 +258,14 @@ def test_the_next_switch_to_offboard_takes_the_mission_up(times: int) -> None:
         script.run(4.0)
         script.mode = FlightMode.OFFBOARD
         script.run(1.0)
-        assert script.sequencer.phase is Phase.LEGS
+        assert script.phase() is Phase.LEGS
         assert not script.sequencer.pilot_flies
         assert script.sequencer.in_offboard
         assert not script.sequencer.taken_over
     assert script.asked.count(RequestKind.OFFBOARD) == 1
     script.legs_done = True
     script.run(3.0)
-    assert script.sequencer.phase is Phase.DONE
+    assert script.phase() is Phase.DONE
 
 
 def test_a_vehicle_that_is_landed_by_whoever_took_it_ends_the_flight() -> None:
@@ -271,7 +275,7 @@ def test_a_vehicle_that_is_landed_by_whoever_took_it_ends_the_flight() -> None:
     script.run(3.0)
     script.armed = script.in_air = False
     script.run(0.1)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert "taken over" in script.sequencer.reason
     assert not script.sequencer.hand_over
 
@@ -284,7 +288,7 @@ def test_ctrl_c_leaves_a_vehicle_alone_that_somebody_else_has() -> None:
     asked = len(script.asked)
     script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
     script.run(1.0)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert not script.sequencer.hand_over
     assert len(script.asked) == asked
 
@@ -294,7 +298,7 @@ def test_refused_arming_aborts_with_the_vehicles_reason() -> None:
     script = _script()
     script.refuse = {RequestKind.ARM}
     script.run(5.0)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert script.sequencer.reason == "arm was refused: not now"
 
 
@@ -303,7 +307,7 @@ def test_an_unanswered_take_off_aborts() -> None:
     script = _script()
     script.mute = {RequestKind.TAKEOFF}
     script.run(10.0)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert "no answer" in script.sequencer.reason
 
 
@@ -313,7 +317,7 @@ def test_refused_offboard_is_asked_again_and_then_given_up() -> None:
     script.refuse = {RequestKind.OFFBOARD}
     script.run(25.0)
     assert 5 <= script.asked.count(RequestKind.OFFBOARD) <= 11
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert not script.sequencer.streaming
 
 
@@ -322,7 +326,7 @@ def test_an_uncertain_estimate_does_not_take_off() -> None:
     script = _script()
     script.sigma_m = 2.0
     script.run(35.0)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert "velocity is known to 2.00 m/s" in script.sequencer.reason
     assert script.asked == []
 
@@ -339,7 +343,7 @@ def test_stale_telemetry_stops_the_setpoints_and_fresh_telemetry_brings_them_bac
     script.run(PERIOD_S)
     assert script.sequencer.streaming
     assert script.sequencer.silence_ended
-    assert script.sequencer.phase is Phase.LEGS
+    assert script.phase() is Phase.LEGS
     assert any("telemetry is 0.2 s old" in text for text in script.texts)
     assert any("telemetry is back after 0." in text for text in script.texts)
     script.run(PERIOD_S)
@@ -353,11 +357,11 @@ def test_px4_in_its_failsafe_after_a_silence_is_no_pilot() -> None:
     script.run(2.0)
     script.silent, script.mode = False, FlightMode.HOLD
     script.run(1.0)
-    assert script.sequencer.phase is Phase.LEGS
+    assert script.phase() is Phase.LEGS
     assert script.sequencer.streaming
     script.mode = FlightMode.OFFBOARD
     script.run(2.0)
-    assert script.sequencer.phase is Phase.LEGS
+    assert script.phase() is Phase.LEGS
     script.silent = True
     script.run(2.0)
     script.silent, script.mode = False, FlightMode.HOLD
@@ -370,12 +374,12 @@ def test_a_long_silence_ends_the_mission() -> None:
     script = _in_legs()
     script.silent = True
     script.run(10.0)
-    assert script.sequencer.phase is Phase.LEGS
+    assert script.phase() is Phase.LEGS
     assert not script.sequencer.streaming
     script.silent, script.mode = False, FlightMode.HOLD
     script.run(5.0)
     assert script.asked[-2:] == [RequestKind.HOLD, RequestKind.LAND]
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert script.sequencer.reason == "nothing was heard for 10 s"
     assert any("link lost" in text for text in script.texts)
     assert "link is back" in script.texts
@@ -397,7 +401,7 @@ def test_a_vehicle_that_restarts_in_flight_ends_it() -> None:
     script = _in_legs()
     script.view.update((LinkSample(script.time_s, LinkEvent.REBOOTED),))
     script.sequencer.step(script.time_s + PERIOD_S, script.view, _estimate(script.time_s), False)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert script.sequencer.reason == "the vehicle has restarted in flight"
     assert not script.sequencer.streaming
     assert not script.sequencer.hand_over
@@ -408,9 +412,9 @@ def test_lost_telemetry_aborts() -> None:
     script = _in_legs()
     script.silent = True
     script.run(59.0)
-    assert script.sequencer.phase is Phase.LEGS
+    assert script.phase() is Phase.LEGS
     script.run(3.0)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert not script.sequencer.streaming
 
 
@@ -422,8 +426,8 @@ def test_one_interrupt_holds_and_then_lands() -> None:
     assert script.asked[-1] is RequestKind.HOLD
     assert script.sequencer.reason == "stopped by Ctrl-C"  # known from now on, not only at the end
     script.run(5.0)
-    assert script.asked[-1] is RequestKind.LAND
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.asked[-1:] == [RequestKind.LAND]
+    assert script.phase() is Phase.ABORTED
     assert script.sequencer.reason == "stopped by Ctrl-C"
     assert not script.sequencer.hand_over
 
@@ -433,7 +437,7 @@ def test_two_interrupts_hand_over_at_once() -> None:
     script = _in_legs()
     script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
     script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert not script.sequencer.streaming
     assert script.sequencer.hand_over
 
@@ -445,12 +449,12 @@ def test_engage_by_pilot_asks_for_nothing_and_waits_for_offboard() -> None:
     assert script.asked == []
     script.armed = script.in_air = True
     script.run(20.0)
-    assert script.sequencer.phase is Phase.ENGAGE
+    assert script.phase() is Phase.ENGAGE
     assert script.sequencer.streaming
     assert script.sequencer.pilot_flies
     script.mode = FlightMode.OFFBOARD
     script.run(0.1)
-    assert script.sequencer.phase is Phase.LEGS
+    assert script.phase() is Phase.LEGS
     assert script.asked == []
 
 
@@ -460,7 +464,7 @@ def test_a_vehicle_that_flies_already_is_not_asked_to_take_off() -> None:
     script.armed = script.in_air = True
     script.run(5.0)
     assert script.asked == [RequestKind.OFFBOARD]
-    assert script.sequencer.phase is Phase.LEGS
+    assert script.phase() is Phase.LEGS
 
 
 def test_silence_from_the_start_ends_with_what_was_missing() -> None:
@@ -468,7 +472,7 @@ def test_silence_from_the_start_ends_with_what_was_missing() -> None:
     script = _script()
     script.silent = True
     script.run(16.0)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert "no heartbeat" in script.sequencer.reason
 
 
@@ -485,12 +489,12 @@ def test_an_old_heartbeat_after_the_mode_change_is_no_take_over() -> None:
     """Offboard accepted, but the last heartbeat still tells hold: the legs fly on, and wait when hold stays."""
     script = _script()
     script.run(5.0)
-    while script.sequencer.phase is not Phase.LEGS:
+    while script.phase() is not Phase.LEGS:
         script.run(PERIOD_S)
         if script.mode is FlightMode.OFFBOARD:
             script.mode = FlightMode.HOLD
     script.run(1.0)
-    assert script.sequencer.phase is Phase.LEGS
+    assert script.phase() is Phase.LEGS
     script.run(1.0)
     assert script.sequencer.taken_over
     assert any("left offboard for hold" in text for text in script.texts)
@@ -499,11 +503,11 @@ def test_an_old_heartbeat_after_the_mode_change_is_no_take_over() -> None:
 def test_a_mode_change_while_engaging_is_the_pilots() -> None:
     """Position mode after take-off: offboard is not asked for, and nothing else."""
     script = _script()
-    while script.sequencer.phase is not Phase.ENGAGE:
+    while script.phase() is not Phase.ENGAGE:
         script.run(PERIOD_S)
     script.mode = FlightMode.POSITION
     script.run(3.0)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert "left hold for position" in script.sequencer.reason
     assert script.asked == [RequestKind.ARM, RequestKind.TAKEOFF]
 
@@ -515,7 +519,7 @@ def test_a_mode_change_during_take_off_is_the_pilots() -> None:
     assert script.mode is FlightMode.TAKEOFF
     script.mode = FlightMode.RETURN
     script.run(PERIOD_S)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert "left take-off for return" in script.sequencer.reason
 
 
@@ -533,7 +537,7 @@ def test_a_mode_change_while_ending_is_the_pilots(refuse: set[RequestKind], inte
     script.mode = FlightMode.POSITION
     asked = len(script.asked)
     script.run(5.0)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert not script.sequencer.streaming
     assert len(script.asked) == asked
 
@@ -543,7 +547,7 @@ def test_a_vehicle_that_disarms_in_the_legs_ends_the_flight() -> None:
     script = _in_legs()
     script.armed = False
     script.run(0.1)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert "disarmed" in script.sequencer.reason
 
 
@@ -556,7 +560,7 @@ def test_refused_hold_goes_on_to_the_ending() -> None:
     assert script.sequencer.streaming
     script.run(3.0)
     assert script.asked[-2:] == [RequestKind.HOLD, RequestKind.LAND]
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert script.sequencer.reason == "stopped by Ctrl-C"
 
 
@@ -574,10 +578,10 @@ def test_an_interrupt_leaves_a_vehicle_that_the_pilot_flies_alone() -> None:
     script = _script(Engage.PILOT)
     script.armed = script.in_air = True
     script.run(5.0)
-    assert script.sequencer.phase is Phase.ENGAGE
+    assert script.phase() is Phase.ENGAGE
     script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
     script.run(1.0)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert script.asked == []
     assert not script.sequencer.hand_over
 
@@ -590,7 +594,7 @@ def test_a_pilot_who_lands_again_is_waited_for_anew() -> None:
     script.armed = script.in_air = False
     script.mode = FlightMode.OFFBOARD
     script.run(1.0)
-    assert script.sequencer.phase is Phase.PREFLIGHT
+    assert script.phase() is Phase.PREFLIGHT
     assert not script.sequencer.streaming
 
 
@@ -600,14 +604,14 @@ def test_a_short_uncertainty_after_a_long_wait_is_forgiven() -> None:
     script.run(60.0)
     script.sigma_m = 2.0
     script.run(5.0)
-    assert script.sequencer.phase is Phase.PREFLIGHT
+    assert script.phase() is Phase.PREFLIGHT
     script.sigma_m = 0.01
     script.run(5.0)
     script.sigma_m = 2.0
     script.run(28.0)
-    assert script.sequencer.phase is Phase.PREFLIGHT
+    assert script.phase() is Phase.PREFLIGHT
     script.run(3.0)
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
 
 
 def test_an_interrupt_while_ending_is_answered() -> None:
@@ -617,10 +621,10 @@ def test_an_interrupt_while_ending_is_answered() -> None:
     script.run(0.1)
     script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
     script.run(0.1)
-    assert script.sequencer.phase is Phase.ENDING
+    assert script.phase() is Phase.ENDING
     assert any("once more hands over" in text for text in script.texts)
     script.sequencer.interrupt(script.time_s, "stopped by Ctrl-C")
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert not script.sequencer.hand_over
 
 
@@ -630,7 +634,7 @@ def test_leaving_hands_over_what_uasfly_flies(seconds: float, hand_over: bool) -
     script = _script()
     script.run(seconds)
     script.sequencer.leave(script.time_s, "a bug")
-    assert script.sequencer.phase is Phase.ABORTED
+    assert script.phase() is Phase.ABORTED
     assert script.sequencer.hand_over is hand_over
     assert script.sequencer.reason == "a bug"
 
@@ -645,4 +649,4 @@ def test_odometry_from_the_future_is_stale() -> None:
     script.silent = False
     script.run(0.1)
     assert script.sequencer.streaming
-    assert script.sequencer.phase is Phase.LEGS
+    assert script.phase() is Phase.LEGS

@@ -30,9 +30,9 @@ def test_pieces_give_what_the_whole_gives(late: int) -> None:
     """Random estimates over many comparisons, truth and GNSS late and in pairs out of order: each counts once."""
     rng = np.random.default_rng(late)
     count = 10 * EVERY_CYCLES + 7
-    times = 0.02 * np.arange(count)
+    times: Array = 0.02 * np.arange(count, dtype=float)
     estimate, reference = rng.standard_normal((2, count, 3))
-    asked = times[:-1] + 0.013
+    asked: Array = times[:-1] + 0.013
     true = asked[:, None] * np.array((3.0, -2.0, 1.0))  # a line: what lies around a time does not matter on it
     fixes = rng.standard_normal((count - 1, 3))
     errors = TrackingErrors()

@@ -11,7 +11,8 @@ import argparse
 import os
 import sys
 
-from tests.fuzz.campaign import TARGETS, Tally, run
+from tests.fuzz.campaign import TARGETS, run
+from tests.fuzz.harness import Tally
 
 
 def main() -> int:

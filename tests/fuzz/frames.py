@@ -13,7 +13,7 @@ from tests.fuzz.odd import choice
 
 Fields = dict[str, Any]
 CLASSES: dict[str, Any] = {message.msgname: message for message in dialect.mavlink_map.values()}
-LARGEST_FLOAT = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
+LARGEST_FLOAT: float = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 _BITS = {"b": 8, "h": 16, "i": 32, "q": 64}
 _FLOATS = (
     0.0,
@@ -54,7 +54,7 @@ def number(rng: Rng, letter: str) -> float | int:
             return float(struct.unpack("<f", rng.bytes(4))[0])
         return float(rng.normal(0.0, 10.0 ** rng.uniform(-2.0, 4.0)))
     bits = _BITS[letter.lower()]
-    low, high = (0, 2**bits - 1) if letter.isupper() else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    low, high = (0, (1 << bits) - 1) if letter.isupper() else (-(1 << (bits - 1)), (1 << (bits - 1)) - 1)
     kind = rng.integers(4)
     if kind == 0:
         return choice(rng, (low, high, 0, 1, min(high, 127)))

@@ -80,7 +80,7 @@ class HostClock:
         self.now_s = 1000.0
 
     def __enter__(self) -> None:
-        self._patches = [
+        self._patches: list[mock._patch[Callable[[], float]]] = [
             mock.patch("time.monotonic", lambda: self.now_s),
             mock.patch("time.monotonic_ns", lambda: round(self.now_s * 1e9)),
         ]

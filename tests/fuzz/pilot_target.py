@@ -13,8 +13,8 @@ from tests.fuzz import frames
 from tests.fuzz.harness import FindingError, Rng
 from tests.fuzz.odd import choice
 from uasfly.drivers.plan import FlightPlan, build_pilot, load_plan
+from uasfly.flight.choices import Engage
 from uasfly.flight.pilot import Pilot
-from uasfly.flight.sequencer import Engage
 from uasfly.link.encode import check_setpoint
 from uasfly.messages import (
     AccelerometerSample,
@@ -155,8 +155,9 @@ def _odd_sample(rng: Rng, now_s: float) -> Sample:
         mode = FlightMode.OFFBOARD if rng.random() < 0.9 else choice(rng, list(FlightMode))
         return VehicleSample(time_s, mode, rng.random() < 0.95, rng.random() < 0.95)
     if kind == 6:
-        flags = [bool(rng.random() < 0.9) for _ in range(3)]
-        return HealthSample(time_s, *flags, int(rng.integers(256)), int(rng.integers(256)), number())
+        position, velocity, attitude_ok = (bool(rng.random() < 0.9) for _ in range(3))
+        fix, satellites = int(rng.integers(256)), int(rng.integers(256))
+        return HealthSample(time_s, position, velocity, attitude_ok, fix, satellites, number())
     if kind == 7:
         return TextSample(time_s, int(rng.integers(-3, 300)), choice(rng, ("", "x", "\x1b[2J", "é" * 300)))
     if kind in (8, 9):

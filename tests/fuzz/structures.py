@@ -117,7 +117,7 @@ def _number(rng: Rng, schema: dict[str, Any]) -> float:
     if high is None:
         return low + abs(odd_number(rng))
     if kind == 2:
-        return low + (high - low) * float(10.0 ** rng.uniform(-9.0, 0.0))
+        return float(low + (high - low) * 10.0 ** rng.uniform(-9.0, 0.0))
     return float(rng.uniform(low, high))
 
 
@@ -134,7 +134,7 @@ def changed(rng: Rng, data: Data, maker: SchemaMaker, damage: float) -> Data:
     """Data with some places made anew within the schema, or with the probability `damage` out of it."""
     data = copy.deepcopy(data)
     for _ in range(1 + int(rng.geometric(0.4))):
-        path = choice(rng, places(data)[1:] or [()])
+        path: tuple[str | int, ...] = choice(rng, places(data)[1:] or [()])
         if not path:
             return odd_data(rng)
         parent = data
@@ -153,7 +153,7 @@ def _damage(rng: Rng, parent: Data, key: str | int) -> None:
     kind = rng.integers(4)
     if kind == 0:
         del parent[key]
-    elif kind == 1 and isinstance(parent, list):
+    elif kind == 1 and isinstance(parent, list) and isinstance(key, int):
         parent += [copy.deepcopy(parent[key])] * int(rng.integers(1, 30))
     elif kind == 2 and isinstance(parent, dict):
         parent[choice(rng, ("x", "name", "__init__", "\x1b", "", "type", "kind", "v" * 400))] = parent.pop(key)

@@ -19,6 +19,8 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from tests.link.wires import Wire
 
+__all__ = ["FakeVehicle", "mavlink"]
+
 CUSTOM_HOLD = 4 << 16 | 3 << 24
 PX4, ARDUPILOT = 12, 3
 QUADROTOR, GROUND_STATION = 2, 6

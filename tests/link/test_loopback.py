@@ -154,7 +154,7 @@ async def test_the_wind_goes_to_the_ground_station(pair: Pair) -> None:
     """As WIND_COV of the companion computer: towards north and east, what is not known as NaN."""
     link, vehicle = pair
     link.send_wind(wind_estimate())
-    await arrived(lambda: vehicle.of_type("WIND_COV"))
+    await arrived(lambda: bool(vehicle.of_type("WIND_COV")))
     (told,) = vehicle.of_type("WIND_COV")
     assert (told.wind_x, told.wind_y, told.horiz_accuracy, told.var_horiz) == pytest.approx((-3.0, -5.0, 0.2, 1.1))
     assert all(map(math.isnan, (told.wind_z, told.var_vert, told.wind_alt)))

@@ -45,8 +45,13 @@ async def test_wake_ups_from_another_thread_are_coalesced() -> None:
         heard.set()
 
     wake_up = WakeUp(asyncio.get_running_loop(), on_wake)
+
+    def ring_often() -> None:
+        for _ in range(1000):
+            wake_up.ring()
+
     for round_number in (1, 2):
-        thread = threading.Thread(target=lambda: [wake_up.ring() for _ in range(1000)])
+        thread = threading.Thread(target=ring_often)
         thread.start()
         thread.join()
         await asyncio.wait_for(heard.wait(), 10.0)

@@ -35,6 +35,11 @@ class Recording:
         """Time of the last sample."""
         return self.odometry[-1].time_s
 
+    def in_order(self) -> list[OdometrySample | MarkerSample]:
+        """Samples and sightings by their time."""
+        samples: list[OdometrySample | MarkerSample] = [*self.odometry, *self.sightings]
+        return sorted(samples, key=lambda sample: sample.time_s)
+
 
 @lru_cache
 def recording(duration_s: float = 8.0, gnss_bias_density: float = 1e-3, seed: int = 3) -> Recording:
@@ -90,4 +95,5 @@ def replay(
         rows[1].append(estimate.velocity_in_world - flight.velocity[k])
         rows[2].append(turn_between(flight.quaternion[k], estimate.quaternion_body_to_world))
         rows[3].append(estimate.force_in_world - flight.force[k])
-    return Errors(*(np.array(row) for row in rows), estimates)
+    position, velocity, attitude, force = map(np.array, rows)
+    return Errors(position, velocity, attitude, force, estimates)

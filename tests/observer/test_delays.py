@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ def state(observer: Observer) -> Array:
     return observer.moment.packed
 
 
-def feed(samples: list[OdometrySample | MarkerSample], delays_s: Array) -> Observer:
+def feed(samples: Sequence[OdometrySample | MarkerSample], delays_s: Array) -> Observer:
     """An observer after all samples, in the order of their arrival."""
     observer = flying_observer(DURATION_S)
     order = np.argsort([sample.time_s + delay for sample, delay in zip(samples, delays_s, strict=True)], kind="stable")
@@ -44,7 +45,7 @@ def test_odometry_in_any_order_gives_the_same_state() -> None:
 def test_sightings_with_camera_latency_give_the_same_state() -> None:
     """Marker frames 150 ms late, first sight included."""
     flight = recording(DURATION_S)
-    samples = sorted([*flight.odometry, *flight.sightings], key=lambda sample: sample.time_s)
+    samples = flight.in_order()
     delays = np.array([0.15 if isinstance(sample, MarkerSample) else 0.0 for sample in samples])
     in_order, late = feed(samples, np.zeros(len(samples))), feed(samples, delays)
     assert late.counters.late == len(flight.sightings)
@@ -78,7 +79,7 @@ def test_half_a_second_is_within_the_buffer() -> None:
 def test_a_duplicate_changes_nothing() -> None:
     """Of odometry and of a sighting, new or old."""
     flight = recording(DURATION_S)
-    samples = sorted([*flight.odometry, *flight.sightings], key=lambda sample: sample.time_s)
+    samples = flight.in_order()
     observer = feed(samples, np.zeros(len(samples)))
     before = state(observer).copy()
     for sample in (flight.odometry[-1], flight.odometry[-20], flight.sightings[-1], flight.sightings[-3]):

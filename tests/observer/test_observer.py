@@ -15,6 +15,7 @@ from uasfly.messages import (
     BatterySample,
     FlightMode,
     OdometrySample,
+    Sample,
     Setpoint,
     StateEstimate,
     TextSample,
@@ -275,7 +276,8 @@ def test_samples_that_say_nothing_of_the_state_are_ignored() -> None:
 def test_statistics_tell_the_last_innovation_of_each_sensor() -> None:
     """Normalised innovation squared and its degrees of freedom."""
     flight, observer = recording(2.0), flying_observer(2.0)
-    for sample in [*flight.odometry, *flight.sightings[-2:]]:
+    samples: list[Sample] = [*flight.odometry, *flight.sightings[-2:]]
+    for sample in samples:
         observer.add(sample)
     assert {name: dof for name, (_, dof) in observer.statistics.items()} == {
         "attitude": 3,

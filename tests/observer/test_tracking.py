@@ -164,7 +164,7 @@ def test_nothing_steps_when_the_bias_is_freed_or_held_again() -> None:
 def test_a_marker_is_found_where_it_is() -> None:
     """Its pose and sigma after some seconds of sightings."""
     flight, observer = recording(), flying_observer(gnss_bias_density=1e-3)
-    for sample in sorted([*flight.odometry, *flight.sightings], key=lambda x: x.time_s):
+    for sample in flight.in_order():
         observer.add(sample)
     moment = observer.moment
     assert moment is not None

@@ -114,7 +114,7 @@ def test_covariance_matching_finds_the_noise_of_a_sensor(true_scale: float) -> N
     matched = np.eye(3)
     names = [ca.SX.sym("m", 3, 3), ca.SX.sym("r", 3)]
     inverse = up.inverse_of_symmetric_3(ca.DM(expected) + names[0])
-    step = ca.Function("f", names, [up.matched_covariance(names[0], names[0], inverse, names[1], 0.004)])
+    step = ca.Function("f", names, [up.matched_covariance(names[0], names[0], inverse, names[1], ca.SX(0.004))])
     for innovation in rng.multivariate_normal(np.zeros(3), expected + R, 5000):
         matched = np.array(step(matched, innovation).full())
     np.testing.assert_allclose(matched, R, atol=0.25 * true_scale)
@@ -125,7 +125,7 @@ def test_covariance_matching_never_leaves_the_positive_definite() -> None:
     rng = np.random.default_rng(6)
     expected, matched = 100.0 * np.eye(3), 0.01 * np.eye(3)
     for _ in range(50):
-        inverse = np.linalg.inv(expected + matched)
+        inverse = np.asarray(np.linalg.inv(expected + matched), dtype=float)
         innovation = 0.1 * rng.standard_normal(3)  # far smaller than expected
         matched = run(up.matched_covariance, matched, matched, inverse, innovation, 0.1)[0]
         assert np.linalg.eigvalsh(matched).min() > 0.0

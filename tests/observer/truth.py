@@ -44,7 +44,7 @@ def body_z(quaternions: Array) -> Array:
 
 def conjugates(quaternions: Array) -> Array:
     """Inverse quaternions (runs, 4)."""
-    return quaternions * np.array((1.0, -1.0, -1.0, -1.0))
+    return np.asarray(quaternions * np.array((1.0, -1.0, -1.0, -1.0)))
 
 
 def rotated(quaternions: Array, vectors: Array) -> Array:
@@ -60,7 +60,7 @@ def turn_rate(time_s: float) -> Array:
 
 def thrust_command(time_s: float) -> float:
     """Thrust command 0..1 that every flight is given, constant over 20 ms."""
-    return 0.3436 * (1.0 + 0.05 * np.sin(3.0 * round(time_s / 0.02) * 0.02))
+    return float(0.3436 * (1.0 + 0.05 * np.sin(3.0 * round(time_s / 0.02) * 0.02)))
 
 
 def fly_commands(observer: Observer, duration_s: float) -> None:

@@ -30,7 +30,11 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
     def reproduce(name: str, seed: int, progress: Progress) -> Reproduction:
         kept.append((name, seed))
         progress("hover", 0.5)
-        return Reproduction(name, ROWS, {"hover": lambda path: path.write_bytes(b"drawn")} if name else {})
+
+        def draw(path: Path) -> None:
+            path.write_bytes(b"drawn")
+
+        return Reproduction(name, ROWS, {"hover": draw} if name else {})
 
     monkeypatch.setattr(papers, "reproduce", reproduce)
     return kept

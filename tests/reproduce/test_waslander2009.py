@@ -106,9 +106,9 @@ def test_the_same_seed_is_the_same_flight(hovers: dict[str, Record]) -> None:
 def test_legs_that_are_not_flown_to_their_end_are_an_error() -> None:
     """Outside of its fence the flight ends early, and says so."""
     plan = flight_plans(SEED, Extent(straight_m=8.0))["straight path", "pid_dd", BY_ACCELEROMETER]
-    fence = plan.mission.limits.model_copy(
-        update={"geofence": plan.mission.limits.geofence.model_copy(update={"radius_m": 0.5})}
-    )
+    geofence = plan.mission.limits.geofence
+    assert geofence is not None
+    fence = plan.mission.limits.model_copy(update={"geofence": geofence.model_copy(update={"radius_m": 0.5})})
     with pytest.raises(UasflyError, match="expected the legs to be flown to their end"):
         fly(replace(plan, mission=plan.mission.model_copy(update={"limits": fence})))
 
@@ -147,12 +147,8 @@ def test_the_attitude_keeps_its_tilt_error_and_finds_its_heading() -> None:
 
     def error(quaternion: Array) -> Array:
         turned = rotation_matrix(sensors.quaternion) @ rotation_matrix(quaternion).T
-        return (
-            np.degrees(
-                np.array((turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]))
-            )
-            / 2
-        )
+        twice = np.array((turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]))
+        return np.asarray(np.degrees(twice) / 2)
 
     before = error(path[0])
     for quaternion in path[1:]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 import casadi as ca
@@ -33,7 +33,7 @@ def k_thrust(figures: Plant) -> float:
 def hover_speed(figures: Plant) -> float:
     """Rotor speed that carries the weight in still air [rad/s]."""
     share = GRAVITY_M_S2 / k_thrust(figures)
-    return figures.rotors.full_speed_rad_s * share ** (1.0 / figures.rotors.speed_exponent)
+    return float(figures.rotors.full_speed_rad_s * share ** (1.0 / figures.rotors.speed_exponent))
 
 
 def hovering(figures: Plant, height_m: float = 20.0, step_s: float = 0.004) -> PlantDynamics:
@@ -50,7 +50,7 @@ def number(expression: ca.SX, variable: ca.SX, value: Array | list[float]) -> Ar
     return np.array(ca.Function("f", [variable], [expression])(value)).squeeze()
 
 
-def roll_pitch(attitude: Array) -> tuple[float, float]:
+def roll_pitch(attitude: Iterable[float]) -> tuple[float, float]:
     """Roll and pitch [rad] of a quaternion body to world."""
     w, x, y, z = (float(v) for v in attitude)
     return math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), math.asin(2 * (w * y - x * z))

@@ -24,8 +24,8 @@ def acceleration(name: str, free: tuple[float, float, float], jet: tuple[float, 
 def test_a_jet_pushes_the_f550_as_the_paper_measured(speed: float, push: float) -> None:
     """A jet of v m/s pushes the hovering f550 with 0.0155 v^2 m/s^2 along it, whatever its direction."""
     for direction in ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (math.cos(0.5), 0.0, -math.sin(0.5))):
-        jet = tuple(speed * part for part in direction)
-        assert acceleration("f550", (0.0, 0.0, 0.0), jet) == pytest.approx(push * np.array(direction), abs=0.01)
+        x, y, z = (speed * part for part in direction)
+        assert acceleration("f550", (0.0, 0.0, 0.0), (x, y, z)) == pytest.approx(push * np.array(direction), abs=0.01)
 
 
 def test_free_wind_also_acts_on_the_rotors() -> None:

@@ -23,7 +23,9 @@ def _symbols(*sizes: int) -> list[ca.SX]:
 @lru_cache(maxsize=4)
 def _follower(step: float) -> ca.Function:
     symbols = _symbols(4, 3, 4, 1, 1)
-    return ca.Function("follow", symbols, list(follow_reference_model(*symbols, step)))
+    reference, rate, setpoint, yaw_rate, frequency = symbols
+    after = follow_reference_model(reference, rate, setpoint, yaw_rate, frequency, step)
+    return ca.Function("follow", symbols, list(after))
 
 
 @lru_cache(maxsize=1)

@@ -12,7 +12,7 @@ from uasfly.sim.mixer import mix_commands, mixing_matrix
 def mixed(name: str, roll: float, pitch: float, yaw: float, thrust: float) -> tuple[Array, Array]:
     """Motor commands and the share of the torques that they keep."""
     symbol = ca.SX.sym("c", 4)
-    mix = mix_commands(mixing_matrix(plant(name).rotors), symbol[:3], symbol[3])
+    mix = mix_commands(ca.SX(mixing_matrix(plant(name).rotors)), symbol[:3], symbol[3])
     value = number(ca.vertcat(mix.motors, mix.kept), symbol, [roll, pitch, yaw, thrust])
     return value[:-3], value[-3:]
 
@@ -36,9 +36,8 @@ def test_thrust_alone_is_shared_equally(name: str) -> None:
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_torque_command_makes_that_torque_alone(name: str, axis: int) -> None:
     """A small command on one axis makes positive torque about it, none about the others, and no thrust."""
-    command = [0.0, 0.0, 0.0]
-    command[axis] = 0.05
-    motors, _ = mixed(name, *command, 0.5)
+    roll, pitch, yaw = (0.05 if index == axis else 0.0 for index in range(3))
+    motors, _ = mixed(name, roll, pitch, yaw, 0.5)
     made = torques(name, motors)
     assert made[axis] > 0.05
     assert np.delete(made[:3], axis) == pytest.approx(np.zeros(2), abs=1e-9)
@@ -89,7 +88,7 @@ def test_every_command_stays_in_range() -> None:
     """Whatever is asked, motors stay within 0..1."""
     rng = np.random.default_rng(3)
     symbol = ca.SX.sym("c", 4)
-    mix = mix_commands(mixing_matrix(plant("f550").rotors), symbol[:3], symbol[3])
+    mix = mix_commands(ca.SX(mixing_matrix(plant("f550").rotors)), symbol[:3], symbol[3])
     function = ca.Function("f", [symbol], [mix.motors, mix.kept])
     for _ in range(500):
         motors, kept = (np.array(v) for v in function([*rng.normal(0.0, 1.0, 3), rng.uniform()]))

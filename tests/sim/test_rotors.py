@@ -37,7 +37,7 @@ def test_inflow_satisfies_momentum_and_blade_element_theory(axial: float, in_pla
 
     def mismatch(induced: float) -> float:
         thrust = 1.0 - slope * (axial + induced - 1.0)
-        return induced * np.hypot(in_plane, axial + induced) - thrust
+        return float(induced * np.hypot(in_plane, axial + induced) - thrust)
 
     induced = brentq(mismatch, 0.0, 4.0)
     assert ratio(axial, in_plane, slope)[0] == pytest.approx(1.0 - slope * (axial + induced - 1.0), abs=2e-3)

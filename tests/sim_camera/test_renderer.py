@@ -112,7 +112,7 @@ def test_a_rolling_shutter_shears_what_moves() -> None:
         return float(249.5 - black.sum())
 
     rows = np.arange(170, 300)
-    lean = np.polyfit(rows, [left_edge(row) for row in rows], 1)[0]
+    lean = np.polyfit(rows, [left_edge(row) for row in rows.tolist()], 1)[0]
     # the camera moves to its left, so what it sees moves to the right in later rows
     assert lean == pytest.approx(camera.fx * 1.0 * 0.02 / (camera.height_px - 1), abs=0.001)
 

@@ -87,14 +87,11 @@ def test_a_page_on_the_floor_looks_up() -> None:
 
 def test_moves_add_up() -> None:
     """At once or evenly over a while; before the schedule's clock runs nothing has moved."""
-    placement = BundlePlacement(
-        on="floor",
-        position_m=(1.0, 0.0, 0.0),
-        moves=(
-            {"at_s": 5.0, "offset_m": (0.5, 0.0, 0.0)},
-            {"at_s": 10.0, "offset_m": (0.0, 1.0, 0.0), "turn_deg": 90.0, "duration_s": 2.0},
-        ),
+    moves = (
+        {"at_s": 5.0, "offset_m": (0.5, 0.0, 0.0)},
+        {"at_s": 10.0, "offset_m": (0.0, 1.0, 0.0), "turn_deg": 90.0, "duration_s": 2.0},
     )
+    placement = BundlePlacement.model_validate({"on": "floor", "position_m": (1.0, 0.0, 0.0), "moves": moves})
     placed = PlacedBundle(placement)
     for since_s, expected in ((-math.inf, (1.0, 0.0)), (5.0, (1.5, 0.0)), (11.0, (1.5, 0.5)), (99.0, (1.5, 1.0))):
         assert placed.pose(since_s)[0][:2] == pytest.approx(expected)

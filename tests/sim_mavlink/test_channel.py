@@ -1,4 +1,5 @@
 import socket
+from collections.abc import Iterator
 
 import pytest
 from pymavlink.dialects.v20 import development as dialect
@@ -14,14 +15,14 @@ def _beat() -> object:
 
 
 @pytest.fixture
-def home() -> Client:
+def home() -> Iterator[Client]:
     """The client that telemetry goes to from the start."""
     with Client() as client:
         yield client
 
 
 @pytest.fixture
-def channel(home: Client) -> UdpChannel:
+def channel(home: Client) -> Iterator[UdpChannel]:
     """A channel to it from a free port."""
     channel = UdpChannel(("127.0.0.1", home.port), 0, Identity(3))
     home.vehicle = ("127.0.0.1", channel.local_port)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from tests.sim_mavlink.bench import Bench, only
+from tests.sim_mavlink.bench import Bench, Message, only
 from tests.sim_mavlink.fakes import YAW_RAD
 from uasfly.frames import quaternion_from_euler
 from uasfly.messages import FlightMode
@@ -28,7 +28,7 @@ IDS = {
 }
 
 
-def _message(bench: Bench, name: str) -> object:
+def _message(bench: Bench, name: str) -> Message:
     message, ack = bench.command(REQUEST, IDS[name])
     assert message.get_type() == name
     assert ack.result == 0

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from tests.sim_mavlink.client import Client
+from tests.sim_mavlink.client import Client, Message
 from tests.sim_mavlink.fakes import FakeVehicle
 from uasfly.errors import LinkError
 from uasfly.sim.mavlink.server import MAX_LAG_S, Server, ServerReport, serve
@@ -74,7 +74,11 @@ def test_the_vehicles_clock_keeps_pace_with_the_hosts(running: Running) -> None:
     for _ in range(2):
         sent = time.monotonic_ns()
         running.client.send(dialect.MAVLink_timesync_message(0, sent))
-        answer = running.client.wait_for("TIMESYNC", lambda m, sent=sent: m.tc1 > 0 and m.ts1 == sent)
+
+        def answers(m: Message, sent: int = sent) -> bool:
+            return bool(m.tc1 > 0 and m.ts1 == sent)
+
+        answer = running.client.wait_for("TIMESYNC", answers)
         offsets_ns.append((answer.tc1 - time.monotonic_ns(), answer.tc1 - sent))
         running.client.receive(0.6)
     (low_1, high_1), (low_2, high_2) = offsets_ns
@@ -186,9 +190,9 @@ def test_a_vehicle_without_streams_keeps_pace(stepped: Stepped, monkeypatch: pyt
     """When nothing is due for long, the server still wakes often enough to simulate all of the time."""
     waits = []
 
-    def wait(*arguments: object) -> None:
-        waits.append(arguments[3])
-        stepped.now_s += arguments[3]
+    def wait(_read: object, _write: object, _failed: object, timeout_s: float) -> None:
+        waits.append(timeout_s)
+        stepped.now_s += timeout_s
 
     monkeypatch.setattr("uasfly.sim.mavlink.server.select.select", wait)
     for stream in stepped.server.endpoint._scheduler._timers:

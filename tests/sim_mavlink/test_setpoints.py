@@ -1,4 +1,5 @@
 import math
+from typing import TypedDict
 
 import numpy as np
 import pytest
@@ -9,6 +10,12 @@ from uasfly.frames import quaternion_from_euler, swap_quaternion_enu_ned
 
 LEVEL_NORTH = (1.0, 0.0, 0.0, 0.0)
 COMMAND_SET_MODE = 176
+
+
+class _Change(TypedDict, total=False):
+    quaternion: tuple[float, ...]
+    yaw_rate: float
+    thrust: float
 
 
 def _send(
@@ -98,7 +105,7 @@ def test_setpoints_for_others_do_not_count(bench: Bench, target: tuple[int, int]
         (32, {}),
     ],
 )
-def test_setpoints_that_cannot_be_flown_are_refused_aloud(bench: Bench, mask: int, change: dict[str, object]) -> None:
+def test_setpoints_that_cannot_be_flown_are_refused_aloud(bench: Bench, mask: int, change: _Change) -> None:
     """No numbers, no direction, rates alone, no thrust: a text once a second says so."""
     for _ in range(10):
         _send(bench, mask, **change)

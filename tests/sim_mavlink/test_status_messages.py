@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from tests.sim_mavlink.bench import UNIX_S, Bench, only
+from tests.sim_mavlink.bench import UNIX_S, Bench, Message, only
 from uasfly.messages import BatterySample, FlightMode, TextSample
 
 
@@ -14,7 +14,7 @@ def bench() -> Bench:
     return bench
 
 
-def _last(bench: Bench, name: str, duration_s: float = 2.1) -> object:
+def _last(bench: Bench, name: str, duration_s: float = 2.1) -> Message:
     return only(bench.run(duration_s), name)[-1]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from uasfly.airframe import Limits
@@ -21,15 +23,16 @@ LIMITS = Limits(
     acceleration_m_s2=3.0,
     yaw_rate_deg_s=90.0,
 )
+LegFields = Mapping[str, object]  # a leg as its file says it
 HOME = np.array((0.0, 0.0, 1.5))
 
 
-def mission(*legs: dict[str, object], **fields: object) -> Mission:
+def mission(*legs: LegFields, **fields: object) -> Mission:
     """A mission of these legs that takes off to 1.5 m."""
     return Mission.model_validate({"name": "test", "takeoff": {"height_m": 1.5}, "legs": legs, **fields})
 
 
-def fly(*legs: dict[str, object], start: Array = HOME, start_yaw: float = 0.0, **fields: object) -> MissionTrajectory:
+def fly(*legs: LegFields, start: Array = HOME, start_yaw: float = 0.0, **fields: object) -> MissionTrajectory:
     """The trajectory of a mission of these legs."""
     return MissionTrajectory(mission(*legs, **fields), LIMITS, start, start_yaw)
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
 
+from tests.trajectories.motion import LegFields
 from tests.trajectories.motion import mission as any_mission
 from uasfly.airframe import Airframe
 from uasfly.files import find_file, load_file, parse_overrides
@@ -30,7 +33,9 @@ SPIRAL = {
 }
 
 
-def mission(*legs: dict[str, object], wind_m_s: float = 3.0, limits: dict[str, object] | None = None, **fields: object):
+def mission(
+    *legs: LegFields, wind_m_s: float = 3.0, limits: Mapping[str, object] | None = None, **fields: object
+) -> Mission:
     """A mission for light wind, so that wind is a finding only where a test asks for it."""
     return any_mission(*legs, limits={"wind_m_s": wind_m_s, **(limits or {})}, **fields)
 
@@ -55,7 +60,7 @@ def suggestion(finding: Finding) -> tuple[str, float]:
     return match[1], float(match[2])
 
 
-def test_a_mission_within_the_limits_has_no_findings(f550):
+def test_a_mission_within_the_limits_has_no_findings(f550: Airframe) -> None:
     """Nothing to say."""
     assert check_mission(mission(HOVER, CIRCLE, LINE), f550) == []
 
@@ -79,7 +84,9 @@ def test_a_mission_within_the_limits_has_no_findings(f550):
         ({**LINE, "acceleration_m_s2": 4.0, "jerk_m_s3": 20.0}, "legs[0].acceleration_m_s2", "of 4.00 m/s^2"),
     ],
 )
-def test_too_fast_and_too_quick_are_errors_and_the_mend_mends(f550, leg, field, words):
+def test_too_fast_and_too_quick_are_errors_and_the_mend_mends(
+    f550: Airframe, leg: LegFields, field: str, words: str
+) -> None:
     """The value that the text proposes makes the error go away."""
     finding, *others = check_mission(mission(leg), f550)
     assert {other.severity for other in others} <= {"warning"}
@@ -89,7 +96,7 @@ def test_too_fast_and_too_quick_are_errors_and_the_mend_mends(f550, leg, field, 
     assert check_mission(mission({**leg, name: value}), f550) == []
 
 
-def test_waypoints_that_are_too_fast_are_told_by_a_factor(f550):
+def test_waypoints_that_are_too_fast_are_told_by_a_factor(f550: Airframe) -> None:
     """Their speeds stand in several places."""
     points = [{"position_m": (0, 0, 1.5)}, {"position_m": (60, 0, 1.5), "speed_m_s": 7.0}]
     leg = {"type": "waypoints", "points": points, "acceleration_m_s2": 2.0}
@@ -98,7 +105,7 @@ def test_waypoints_that_are_too_fast_are_told_by_a_factor(f550):
     assert "multiply its speeds by 0.71" in finding.text
 
 
-def test_a_yaw_rate_beyond_the_limit_is_an_error(f550):
+def test_a_yaw_rate_beyond_the_limit_is_an_error(f550: Airframe) -> None:
     """Facing a point beside the track asks for a whirl."""
     leg = {**LINE, "yaw": {"rule": "facing", "point_m": (30.0, 0.2)}}
     finding = only(check_mission(mission(leg), f550))
@@ -115,7 +122,9 @@ def test_a_yaw_rate_beyond_the_limit_is_an_error(f550):
         ({"altitude_min_m": 1.2}, "limits.altitude_min_m"),
     ],
 )
-def test_leaving_the_fence_or_the_altitudes_is_an_error(f550, limits, field):
+def test_leaving_the_fence_or_the_altitudes_is_an_error(
+    f550: Airframe, limits: Mapping[str, object], field: str
+) -> None:
     """Legs and transitions alike."""
     high, low = {**HOVER, "position_m": (0, 0, 2.0)}, {**HOVER, "position_m": (0, 0, 1.0)}
     findings = check_mission(mission(high, low, {**LINE, "from_m": (0, 0, 1.5)}, limits=limits), f550)
@@ -124,7 +133,7 @@ def test_leaving_the_fence_or_the_altitudes_is_an_error(f550, limits, field):
     assert all(finding.severity == "error" for finding in findings)
 
 
-def test_a_transition_outside_the_fence_is_found(f550):
+def test_a_transition_outside_the_fence_is_found(f550: Airframe) -> None:
     """Both legs lie inside a small fence that the way from the take-off point to them does not."""
     leg = {**HOVER, "position_m": (20, 0, 1.5)}
     finding = only(check_mission(mission(leg, limits={"geofence": {"radius_m": 5.0, "center_m": (20, 0)}}), f550))
@@ -135,14 +144,14 @@ def test_a_transition_outside_the_fence_is_found(f550):
     )
 
 
-def test_the_take_off_ends_within_the_altitudes(f550):
+def test_the_take_off_ends_within_the_altitudes(f550: Airframe) -> None:
     """Too low and too high."""
     for limits in ({"altitude_min_m": 1.6}, {"altitude_max_m": 1.4}):
         findings = check_mission(mission(HOVER, limits=limits), f550)
         assert "takeoff.height_m" in {finding.field for finding in findings}
 
 
-def test_wind_needs_tilt_and_the_mend_says_how_much_is_possible(f550):
+def test_wind_needs_tilt_and_the_mend_says_how_much_is_possible(f550: Airframe) -> None:
     """f550: 30 deg hold 21.7 m/s, 15 % less leaves room for gusts."""
     error, warning = check_mission(mission(HOVER, wind_m_s=25.0), f550)
     assert (error.severity, error.field) == ("error", "limits.wind_m_s")
@@ -155,7 +164,7 @@ def test_wind_needs_tilt_and_the_mend_says_how_much_is_possible(f550):
     only(check_mission(mission(HOVER, wind_m_s=18.0), f550), "warning")
 
 
-def test_accelerating_in_wind_needs_both(f550):
+def test_accelerating_in_wind_needs_both(f550: Airframe) -> None:
     """What fits alone does not fit together."""
     quick = {**LINE, "acceleration_m_s2": 3.0, "jerk_m_s3": 10.0}
     assert check_mission(mission(quick), f550) == []
@@ -164,7 +173,7 @@ def test_accelerating_in_wind_needs_both(f550):
     assert "deg of tilt" in finding.text
 
 
-def test_without_drag_less_wind_is_no_mend(f550):
+def test_without_drag_less_wind_is_no_mend(f550: Airframe) -> None:
     """A vehicle without drag tilts for what it accelerates alone."""
     settings = ["model.drag_1_s=[0, 0, 0]", "limits.tilt_deg=15", "limits.acceleration_m_s2=5"]
     smooth = load_file(find_file("airframe", "f550"), Airframe, parse_overrides(settings))
@@ -173,7 +182,7 @@ def test_without_drag_less_wind_is_no_mend(f550):
     assert "lower limits.wind_m_s" not in finding.text
 
 
-def test_thrust_needs_headroom_too(f550):
+def test_thrust_needs_headroom_too(f550: Airframe) -> None:
     """A weak vehicle hovers and cannot lean into the wind; a lively one cannot fall as fast as asked."""
     weak = load_file(
         find_file("airframe", "f550"),
@@ -193,36 +202,36 @@ def test_thrust_needs_headroom_too(f550):
     assert any(finding.field == "legs[0]" and "falls so fast" in finding.text for finding in falling)
 
 
-def test_transitions_faster_than_the_airframe_are_a_warning(f550):
+def test_transitions_faster_than_the_airframe_are_a_warning(f550: Airframe) -> None:
     """They keep to its limits, so nothing is lost but time."""
     finding = only(check_mission(mission(HOVER, transition={"speed_m_s": 9.0}), f550), "warning")
     assert finding.field == "transition.speed_m_s"
 
 
-def test_a_leg_that_cannot_be_built_is_one_error(f550):
+def test_a_leg_that_cannot_be_built_is_one_error(f550: Airframe) -> None:
     """Its own text names what is possible."""
     finding = only(check_mission(mission({**SPIRAL, "duration_s": 2.0}), f550))
     assert finding.field == "legs[0].duration_s"
     assert "give at least" in finding.text
 
 
-def test_errors_come_first(f550):
+def test_errors_come_first(f550: Airframe) -> None:
     """A warning never hides an error."""
     findings = check_mission(mission({**LINE, "speed_m_s": 8.0}, transition={"speed_m_s": 9.0}), f550)
     assert [finding.severity for finding in findings] == sorted(finding.severity for finding in findings)
 
 
-def test_missions_come_from_files_too(f550):
+def test_missions_come_from_files_too(f550: Airframe) -> None:
     """The same check, by name."""
     fast = load_file(find_file("mission", "circle"), Mission, parse_overrides(["legs[0].period_s=3"]))
     assert any(finding.field == "legs[0].period_s" for finding in check_mission(fast, f550))
 
 
-MARKER = {"frame": "marker", "marker": {"bundle": "four_36h11"}}
+MARKER: dict[str, Any] = {"frame": "marker", "marker": {"bundle": "four_36h11"}}
 STANDOFF = {"type": "hover", "position_m": (4.2, 0, 0.2), "duration_s": 5.0}
 
 
-def test_a_mission_of_a_marker_is_checked_without_knowing_where_it_is(f550):
+def test_a_mission_of_a_marker_is_checked_without_knowing_where_it_is(f550: Airframe) -> None:
     """As if its first leg began where the take-off ends; what is then outside is a warning only."""
     fenced = {"geofence": {"radius_m": 3.0}, "altitude_max_m": 2.0}
     assert check_mission(mission(STANDOFF, **MARKER, limits=fenced), f550) == []
@@ -235,7 +244,7 @@ def test_a_mission_of_a_marker_is_checked_without_knowing_where_it_is(f550):
     assert all("if the first leg begins where the take-off ends" in finding.text for finding in findings)
 
 
-def test_an_airframes_limits_are_errors_in_a_markers_frame_too(f550):
+def test_an_airframes_limits_are_errors_in_a_markers_frame_too(f550: Airframe) -> None:
     """A leg that is too fast is too fast anywhere, and so is a take-off beyond the altitudes."""
     fast = {**LINE, "from_m": (3, 0, 0), "speed_m_s": 9.0}
     assert only(check_mission(mission(fast, **MARKER, limits={"altitude_min_m": 0.5}), f550)).field.startswith(
@@ -245,7 +254,7 @@ def test_an_airframes_limits_are_errors_in_a_markers_frame_too(f550):
     assert "takeoff.height_m" in {finding.field for finding in check_mission(low, f550)}
 
 
-def test_a_bundle_that_nobody_has_is_an_error(f550):
+def test_a_bundle_that_nobody_has_is_an_error(f550: Airframe) -> None:
     """With the names there are."""
     lost = mission(STANDOFF, frame="marker", marker={"bundle": "for_36h11"})
     finding = only(check_mission(lost, f550))
@@ -253,7 +262,7 @@ def test_a_bundle_that_nobody_has_is_an_error(f550):
     assert "did you mean four_36h11" in finding.text
 
 
-def test_a_placed_mission_is_held_against_the_fence_around_the_take_off(f550):
+def test_a_placed_mission_is_held_against_the_fence_around_the_take_off(f550: Airframe) -> None:
     """Ways between the legs included; in place it has nothing to say."""
     flight = mission(STANDOFF, **MARKER, limits={"geofence": {"radius_m": 6.0}})
     take_off, start = np.array((1.0, 2.0, 0.0)), np.array((1.0, 2.0, 1.5))

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.trajectories.motion import HOME, LIMITS, assert_consistent, fly, mission, peak, peak_jerk
+from tests.trajectories.motion import HOME, LIMITS, LegFields, assert_consistent, fly, mission, peak, peak_jerk
 from uasfly.trajectories.mission_trajectory import MissionTrajectory
 from uasfly.trajectories.placement import Placement
 
-LEGS = (
+LEGS: tuple[LegFields, ...] = (
     {"type": "hover", "position_m": (0, 0, 1.5), "duration_s": 3.0},
     {"type": "circle", "center_m": (1, 1), "radius_m": 1.0, "height_m": 2.0, "speed_m_s": 0.6, "name": "round"},
     {"type": "line", "to_m": (3, 1, 1.0), "speed_m_s": 1.0, "yaw": {"rule": "path"}},
@@ -93,7 +93,7 @@ def trajectory() -> MissionTrajectory:
     return fly(*LEGS, start=START, start_yaw=2.5)
 
 
-def test_position_velocity_acceleration_and_yaw_fit_together_everywhere(trajectory):
+def test_position_velocity_acceleration_and_yaw_fit_together_everywhere(trajectory: MissionTrajectory) -> None:
     """Also over the joints, before the start and after the end."""
     assert_consistent(trajectory, jerk=3.0)
     assert peak_jerk(trajectory) < 3.0
@@ -101,7 +101,7 @@ def test_position_velocity_acceleration_and_yaw_fit_together_everywhere(trajecto
 
 @given(st.lists(legs, min_size=1, max_size=4), st.floats(-10.0, 10.0))
 @settings(max_examples=25, deadline=None)
-def test_any_mission_is_smooth_and_turns_within_its_rate(mission_legs, start_yaw):
+def test_any_mission_is_smooth_and_turns_within_its_rate(mission_legs: list[LegFields], start_yaw: float) -> None:
     """Whatever the legs and yaw rules are."""
     flight = fly(*mission_legs, start_yaw=start_yaw)
     centripetal_jerk = 1.0**3 / 0.5**2 + 3.0 * 0.5 * 1.0 / 0.5
@@ -111,7 +111,7 @@ def test_any_mission_is_smooth_and_turns_within_its_rate(mission_legs, start_yaw
     assert np.abs(np.diff(reference.yaw_rad)).max(initial=0.0) <= 0.0101 * LIMITS.yaw_rate_rad_s
 
 
-def test_it_holds_its_first_and_last_pose_outside(trajectory):
+def test_it_holds_its_first_and_last_pose_outside(trajectory: MissionTrajectory) -> None:
     """Times are clamped, the times themselves are handed back."""
     times = np.array((-5.0, 0.0, trajectory.duration_s, trajectory.duration_s + 5.0))
     reference = trajectory.sample(times)
@@ -125,7 +125,7 @@ def test_it_holds_its_first_and_last_pose_outside(trajectory):
     np.testing.assert_allclose(reference.yaw_rate_rad_s, 0.0, atol=1e-9)
 
 
-def test_samples_do_not_depend_on_what_is_sampled_with_them(trajectory):
+def test_samples_do_not_depend_on_what_is_sampled_with_them(trajectory: MissionTrajectory) -> None:
     """A horizon over several legs equals its times one by one; nothing is kept between calls."""
     times = np.linspace(-1.0, trajectory.duration_s + 1.0, 301)
     together = trajectory.sample(times)
@@ -136,7 +136,7 @@ def test_samples_do_not_depend_on_what_is_sampled_with_them(trajectory):
         assert alone.yaw_rad[0] == pytest.approx(together.yaw_rad[index], abs=1e-12)
 
 
-def test_it_knows_which_leg_flies(trajectory):
+def test_it_knows_which_leg_flies(trajectory: MissionTrajectory) -> None:
     """In a transition the leg ahead is named, but no leg flies."""
     spans = trajectory.spans
     assert [span.leg for span in spans if span.is_leg] == list(range(len(LEGS)))
@@ -157,7 +157,7 @@ def test_it_knows_which_leg_flies(trajectory):
     assert not trajectory.in_leg(trajectory.duration_s + 1.0)
 
 
-def test_transitions_keep_the_missions_and_the_airframes_limits():
+def test_transitions_keep_the_missions_and_the_airframes_limits() -> None:
     """A steep way down is flown at the descent limit, a level one at the transition's speed."""
     transition = {"speed_m_s": 3.0, "acceleration_m_s2": 4.0, "jerk_m_s3": 8.0}
     hover = {"type": "hover", "duration_s": 1.0}
@@ -178,7 +178,7 @@ def test_transitions_keep_the_missions_and_the_airframes_limits():
     assert max(accelerations) <= LIMITS.acceleration_m_s2 + 1e-9
 
 
-def test_the_takeoff_point_is_the_origin_and_can_be_moved():
+def test_the_takeoff_point_is_the_origin_and_can_be_moved() -> None:
     """Points shift with it; points in PX4's local frame do not."""
     origin, other = np.array((10.0, -5.0, 2.0)), np.array((11.0, -5.0, 2.5))
     hover = {"type": "hover", "position_m": (1, 2, 3), "duration_s": 2.0}
@@ -195,7 +195,7 @@ def test_the_takeoff_point_is_the_origin_and_can_be_moved():
 
 
 @pytest.mark.parametrize("heading", [0.7, -2.9])
-def test_a_turned_frame_turns_the_whole_reference_exactly(heading):
+def test_a_turned_frame_turns_the_whole_reference_exactly(heading: float) -> None:
     """Positions, derivatives, yaw and the scalar path: those of the mission's own frame, turned and moved."""
     placement = Placement(np.array((10.0, -5.0, 2.0)), heading)
     own = MissionTrajectory(mission(*LEGS), LIMITS, START, 2.5)
@@ -220,7 +220,7 @@ def test_a_turned_frame_turns_the_whole_reference_exactly(heading):
             )
 
 
-def test_a_placement_takes_points_there_and_back():
+def test_a_placement_takes_points_there_and_back() -> None:
     """The frame's x axis points where its heading says."""
     placement = Placement(np.array((1.0, 2.0, 3.0)), math.pi / 2.0)
     np.testing.assert_allclose(placement.to_world(np.array((4.2, 0.0, 0.2))), (1.0, 6.2, 3.2))
@@ -228,7 +228,7 @@ def test_a_placement_takes_points_there_and_back():
     np.testing.assert_allclose(placement.from_world(placement.to_world(points)), points, atol=1e-12)
 
 
-def test_a_leg_that_begins_where_the_vehicle_is_needs_no_transition():
+def test_a_leg_that_begins_where_the_vehicle_is_needs_no_transition() -> None:
     """Neither way nor turn."""
     hover = {"type": "hover", "position_m": tuple(HOME), "duration_s": 2.0}
     assert len(fly(hover).spans) == 1
@@ -236,7 +236,7 @@ def test_a_leg_that_begins_where_the_vehicle_is_needs_no_transition():
     assert len(fly(hover, start_yaw=0.1).spans) == 2
 
 
-def test_arrays_of_a_sample_can_be_handed_to_a_solver(trajectory):
+def test_arrays_of_a_sample_can_be_handed_to_a_solver(trajectory: MissionTrajectory) -> None:
     """They are contiguous and belong to the caller."""
     times = np.linspace(0.0, 60.0, 41)
     first = trajectory.sample(times)

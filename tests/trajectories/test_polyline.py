@@ -11,6 +11,8 @@ from uasfly.trajectories.pieces import PieceTable
 from uasfly.trajectories.polyline import chain, move
 from uasfly.trajectories.profile import MotionLimits, move_duration
 
+Point = tuple[float, float, float]
+
 coordinate = st.floats(-20.0, 20.0)
 point = st.tuples(coordinate, coordinate, coordinate)
 limits = st.builds(MotionLimits, st.floats(0.2, 5.0), st.floats(0.2, 20.0))
@@ -18,7 +20,9 @@ limits = st.builds(MotionLimits, st.floats(0.2, 5.0), st.floats(0.2, 20.0))
 
 @given(st.lists(point, min_size=2, max_size=7), st.floats(0.1, 5.0), limits, st.data())
 @settings(max_examples=150, deadline=None)
-def test_a_chain_keeps_all_limits_and_arrives(points, speed, limit, data):
+def test_a_chain_keeps_all_limits_and_arrives(
+    points: list[Point], speed: float, limit: MotionLimits, data: st.DataObject
+) -> None:
     """Any corners, doubled points and turning back included."""
     corners = np.array(points)
     speeds = [speed * data.draw(st.floats(0.2, 1.0)) for _ in corners[1:]]
@@ -38,7 +42,9 @@ def test_a_chain_keeps_all_limits_and_arrives(points, speed, limit, data):
 
 @given(point, point, st.floats(0.1, 5.0), limits)
 @settings(max_examples=50, deadline=None)
-def test_a_single_move_is_straight_and_as_fast_as_can_be(start, end, speed, limit):
+def test_a_single_move_is_straight_and_as_fast_as_can_be(
+    start: Point, end: Point, speed: float, limit: MotionLimits
+) -> None:
     """Its duration is that of the seven phases."""
     a, b = np.array(start), np.array(end)
     table = PieceTable(move(a, b, speed, limit))
@@ -52,7 +58,7 @@ def test_a_single_move_is_straight_and_as_fast_as_can_be(start, end, speed, limi
     assert np.all(np.diff((position - a) @ (b - a)) >= -1e-9)
 
 
-def test_a_corner_that_changes_nothing_leaves_no_trace():
+def test_a_corner_that_changes_nothing_leaves_no_trace() -> None:
     """A point in the middle of a straight line at one speed is as if it were not there."""
     limit = MotionLimits(1.0, 2.0)
     corners = np.array(((0.0, 0.0, 0.0), (4.0, 0.0, 0.0), (5.0, 0.0, 0.0), (10.0, 0.0, 0.0)))
@@ -64,7 +70,7 @@ def test_a_corner_that_changes_nothing_leaves_no_trace():
         np.testing.assert_allclose(one, other, atol=1e-9)
 
 
-def test_a_right_angle_is_rounded_and_not_stopped_at():
+def test_a_right_angle_is_rounded_and_not_stopped_at() -> None:
     """The speed stays up, the corner is cut by some of the ramp's length."""
     limit = MotionLimits(1.0, 2.0)
     corners = np.array(((0.0, 0.0, 0.0), (5.0, 0.0, 0.0), (5.0, 5.0, 0.0)))
@@ -76,7 +82,7 @@ def test_a_right_angle_is_rounded_and_not_stopped_at():
     assert np.linalg.norm(velocity[at_corner]) == pytest.approx(np.sqrt(0.5), rel=1e-3)
 
 
-def test_a_short_side_between_long_ones_is_flown_slower():
+def test_a_short_side_between_long_ones_is_flown_slower() -> None:
     """Its two ramps fit into it; the others keep their speed."""
     corners = np.array(((0.0, 0.0, 0.0), (10.0, 0.0, 0.0), (10.0, 0.2, 0.0), (0.0, 0.2, 0.0)))
     table = PieceTable(chain(corners, [2.0, 2.0, 2.0], MotionLimits(1.0, 2.0)))

@@ -22,7 +22,7 @@ distances = st.floats(1e-3, 1e3)
 
 
 @given(st.floats(1e-3, 50.0), limits)
-def test_a_ramp_changes_the_velocity_by_what_was_asked_within_its_limits(delta, limit):
+def test_a_ramp_changes_the_velocity_by_what_was_asked_within_its_limits(delta: float, limit: MotionLimits) -> None:
     """Growing and falling at the jerk, constant in between: the area under the acceleration is the change."""
     growing, constant = ramp_phases(delta, limit)
     assert limit.jerk * growing * (growing + constant) == pytest.approx(delta)
@@ -32,14 +32,14 @@ def test_a_ramp_changes_the_velocity_by_what_was_asked_within_its_limits(delta, 
 
 
 @given(distances, limits)
-def test_at_its_peak_speed_a_move_has_no_cruise(distance, limit):
+def test_at_its_peak_speed_a_move_has_no_cruise(distance: float, limit: MotionLimits) -> None:
     """Both ramps together cover the distance exactly."""
     speed = peak_speed(distance, limit)
     assert speed * ramp_duration(speed, limit) == pytest.approx(distance)
 
 
 @given(distances, st.floats(1e-2, 50.0), limits)
-def test_no_faster_move_exists(distance, speed, limit):
+def test_no_faster_move_exists(distance: float, speed: float, limit: MotionLimits) -> None:
     """Any slower cruise takes longer; the speed limit is kept by asking for no more."""
     shortest = move_duration(distance, speed, limit)
     cruise = min(speed, peak_speed(distance, limit))
@@ -49,7 +49,7 @@ def test_no_faster_move_exists(distance, speed, limit):
 
 
 @given(distances, limits, st.floats(1.0, 50.0))
-def test_a_duration_is_met_exactly(distance, limit, factor):
+def test_a_duration_is_met_exactly(distance: float, limit: MotionLimits, factor: float) -> None:
     """Whatever is longer than the fastest move is hit to rounding."""
     duration = factor * move_duration(distance, math.inf, limit)
     speed = speed_for_duration(distance, duration, limit)
@@ -58,16 +58,16 @@ def test_a_duration_is_met_exactly(distance, limit, factor):
 
 
 @given(distances, limits)
-def test_a_duration_that_is_too_short_has_no_speed(distance, limit):
+def test_a_duration_that_is_too_short_has_no_speed(distance: float, limit: MotionLimits) -> None:
     """Shorter than the fastest move cannot be."""
     assert speed_for_duration(distance, 0.99 * move_duration(distance, math.inf, limit), limit) is None
 
 
-def test_no_distance_takes_no_time():
+def test_no_distance_takes_no_time() -> None:
     """A move to where one is."""
     assert move_duration(0.0, 1.0, MotionLimits(1.0, 1.0)) == 0.0
 
 
-def test_a_known_case():
+def test_a_known_case() -> None:
     """10 m at 2 m/s with 1 m/s^2 and 2 m/s^3: 5 s of way and a ramp of 2.5 s."""
     assert move_duration(10.0, 2.0, MotionLimits(1.0, 2.0)) == pytest.approx(7.5)

@@ -33,13 +33,13 @@ def load(name: str) -> Mission:
     return load_file(find_file("mission", name), Mission)
 
 
-def test_these_missions_are_shipped():
+def test_these_missions_are_shipped() -> None:
     """Neither more nor less than the documentation says."""
     assert sorted(shipped_names("mission")) == sorted(MISSIONS)
 
 
 @pytest.mark.parametrize("name", MISSIONS)
-def test_every_airframe_can_fly_it_in_the_wind_it_is_made_for(name):
+def test_every_airframe_can_fly_it_in_the_wind_it_is_made_for(name: str) -> None:
     """Without an error and without a warning."""
     mission = load(name)
     assert mission.name == name
@@ -48,14 +48,14 @@ def test_every_airframe_can_fly_it_in_the_wind_it_is_made_for(name):
 
 
 @pytest.mark.parametrize("name", MISSIONS)
-def test_its_reference_is_smooth(name):
+def test_its_reference_is_smooth(name: str) -> None:
     """On the f550, from a start that is not quite where the mission thinks."""
     limits = load_file(find_file("airframe", "f550"), Airframe).limits
     trajectory = MissionTrajectory(load(name), limits, HOME + np.array((0.1, -0.1, 0.05)), 0.3)
     assert_consistent(trajectory, jerk=2.0, step_s=0.005)
 
 
-def test_the_missions_with_markers_have_the_papers_figures():
+def test_the_missions_with_markers_have_the_papers_figures() -> None:
     """137 s over the floor; 4.2 m off the board and 0.2 m above its centre, looking at it."""
     limits = load_file(find_file("airframe", "aurelia_x6"), Airframe).limits
     over = MissionTrajectory(load("marker_hover"), limits, HOME, 0.0)
@@ -70,7 +70,7 @@ def test_the_missions_with_markers_have_the_papers_figures():
     np.testing.assert_allclose(nose, -ahead, atol=1e-6)
 
 
-def test_the_missions_of_the_paper_have_its_figures():
+def test_the_missions_of_the_paper_have_its_figures() -> None:
     """Hover as long as the blower's programme, a track of 2 m within 120 s, a spiral of 120 s seen from (1, 0)."""
     limits = load_file(find_file("airframe", "f550"), Airframe).limits
     legs = {}

@@ -80,7 +80,7 @@ def render_plane(
     low = np.clip(np.floor(seen.min(axis=0)) - 8, 0, (camera.width_px - 1, camera.height_px - 1)).astype(int)
     high = np.clip(np.ceil(seen.max(axis=0)) + 9, 1, (camera.width_px, camera.height_px)).astype(int)
     u, v = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
-    plane = camera.normalise(np.column_stack((u.ravel(), v.ravel()))).reshape(*u.shape, 2)
+    plane: Array = camera.normalise(np.column_stack((u.ravel(), v.ravel()))).reshape(*u.shape, 2)
     down, across = np.gradient(plane, axis=(0, 1))  # within a pixel the lens is straight
     texture = cv2.copyMakeBorder(texture, 2, 2, 2, 2, cv2.BORDER_CONSTANT, value=AROUND)
     normal, total = rotation[:, 2], np.zeros(u.shape)
@@ -92,7 +92,7 @@ def render_plane(
             ray = np.stack((x * depth, y * depth, depth), axis=-1) - position
             right, up = ray @ rotation[:, 0], ray @ rotation[:, 1]
             total += _interpolated(texture, (right - left) * pixels_per_m + 1.5, (top - up) * pixels_per_m + 1.5)
-    picture = np.full((camera.height_px, camera.width_px), AROUND, dtype=np.float32)
+    picture: np.ndarray = np.full((camera.height_px, camera.width_px), AROUND, dtype=np.float32)
     picture[low[1] : high[1], low[0] : high[0]] = total / supersampling**2
     if blur_px > 0.0:
         picture = cv2.GaussianBlur(picture, (0, 0), blur_px)
@@ -108,7 +108,7 @@ def _interpolated(texture: np.ndarray, x: Array, y: Array) -> Array:
     x, y = x - column, y - row
     above = texture[row, column] * (1 - x) + texture[row, column + 1] * x
     below = texture[row + 1, column] * (1 - x) + texture[row + 1, column + 1] * x
-    return above * (1 - y) + below * y
+    return np.asarray(above * (1 - y) + below * y)
 
 
 def facing_rotation(rng: np.random.Generator, tilt_deg: float) -> Array:
@@ -117,4 +117,4 @@ def facing_rotation(rng: np.random.Generator, tilt_deg: float) -> Array:
     axis = rng.normal(size=3) * (1.0, 1.0, 0.6)
     axis /= np.linalg.norm(axis)
     tilt, _ = cv2.Rodrigues(axis * np.radians(rng.uniform(0.0, tilt_deg)))
-    return tilt @ facing
+    return np.asarray(tilt @ facing, dtype=float)

@@ -29,15 +29,15 @@ def _with(changed: Callable[[Array], Array], number: int = 2, marker_id: int | N
 
 
 def _shifted(corners: Array) -> Array:
-    return corners + np.array((0.03, 0.01, 0.0))
+    return np.asarray(corners + np.array((0.03, 0.01, 0.0)))
 
 
 def _smaller(corners: Array) -> Array:
-    return corners.mean(axis=0) + 0.8 * (corners - corners.mean(axis=0))
+    return np.asarray(corners.mean(axis=0) + 0.8 * (corners - corners.mean(axis=0)))
 
 
 def _torn(corners: Array) -> Array:
-    return corners + np.array(((0.0, 0.0, 0.0), (-0.05, -0.04, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    return np.asarray(corners + np.array(((0.0, 0.0, 0.0), (-0.05, -0.04, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))))
 
 
 def _crossed(corners: Array) -> Array:

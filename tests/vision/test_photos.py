@@ -77,7 +77,8 @@ def test_markers_of_2_cm_agree_with_the_chessboard_that_they_are_in(name: str) -
     points = np.asarray(board.getChessboardCorners())[np.asarray(numbers).ravel()]
     _, turned, at = cv2.solvePnP(points, corners, lens.matrix, lens.coefficients)
     to_page = np.diag((1.0, -1.0, -1.0))  # OpenCV's board has y down and z into the page
-    truth = Pose(at.ravel(), quaternion_of(cv2.Rodrigues(turned)[0] @ to_page))
+    rotation = np.asarray(cv2.Rodrigues(turned)[0] @ to_page, dtype=float)
+    truth = Pose(np.asarray(at, dtype=float).ravel(), quaternion_of(rotation))
     centres = [np.mean(quad, axis=0) @ to_page for quad in board.getObjPoints()]
     markers = [
         {"id": int(marker_id), "size_m": MARKER_M, "position_m": centre.tolist()}

@@ -101,14 +101,16 @@ def test_stag_corners_are_made_exact() -> None:
     """A marker of 160 px on a white page, corners known; the library's own are half a pixel inside."""
     pytest.importorskip("stag")
     marker = cv2.imread(str(test_data("data/stag_markers/HD21_00003.png")), cv2.IMREAD_GRAYSCALE)
+    assert marker is not None
     small = cv2.resize(marker, None, fx=0.4, fy=0.4, interpolation=cv2.INTER_AREA)
     page = cv2.copyMakeBorder(small, 100, 100, 100, 100, cv2.BORDER_CONSTANT, value=255)
     page = cv2.GaussianBlur(page, (0, 0), 0.8)
+    upright, right = (np.asarray(it, dtype=np.uint8) for it in (page, cv2.rotate(page, cv2.ROTATE_90_CLOCKWISE)))
     truth = np.array(((119.5, 119.5), (279.5, 119.5), (279.5, 279.5), (119.5, 279.5)))
-    (detection,) = detect_markers(page, make_detector("stag_hd21"))
+    (detection,) = detect_markers(upright, make_detector("stag_hd21"))
     assert detection.marker_id == 3
     np.testing.assert_allclose(detection.corners, truth, atol=0.1)
-    (turned,) = detect_markers(cv2.rotate(page, cv2.ROTATE_90_CLOCKWISE), make_detector("stag_hd21"))
+    (turned,) = detect_markers(right, make_detector("stag_hd21"))
     np.testing.assert_allclose(turned.corners, truth[[1, 2, 3, 0]], atol=0.1)
 
 

@@ -187,7 +187,11 @@ def test_a_stream_with_time_stamps_is_believed(publisher: Publisher) -> None:
 def test_impossible_time_stamps_are_not_believed(publisher: Publisher) -> None:
     """A stamp of the future, or a very old one, is replaced by the arrival minus the latency."""
     for offset_s in (-100.0, 100.0):
-        publisher.stamp_s = lambda offset_s=offset_s: time.monotonic() + offset_s
+
+        def stamp_s(offset_s: float = offset_s) -> float:
+            return time.monotonic() + offset_s
+
+        publisher.stamp_s = stamp_s
         source = open_source(publisher.server.url, latency_s=0.1)
         frame = next_frame(source)
         assert frame.arrived_s - frame.exposed_s == pytest.approx(0.1)
@@ -269,7 +273,12 @@ def test_a_server_that_stalls_is_lost_and_closes_at_once(answer: bytes, monkeypa
     assert source.take() is None
     assert time.monotonic() - start_s < CLOSED_WITHIN_S
     said: list[Announcement] = []
-    until(lambda: bool(said.extend(source.take_announcements()) or said))
+
+    def heard() -> bool:
+        said.extend(source.take_announcements())
+        return bool(said)
+
+    until(heard)
     assert "silence" in said[0][1]
     assert closed_in(source) < CLOSED_WITHIN_S
     listener.close()
@@ -291,7 +300,12 @@ def test_a_broken_stream_is_a_lost_one(part: bytes) -> None:
     listener, url = _serve(HEAD + part, goes=True)
     source = open_source(url)
     said: list[Announcement] = []
-    until(lambda: bool(said.extend(source.take_announcements()) or said))
+
+    def heard() -> bool:
+        said.extend(source.take_announcements())
+        return bool(said)
+
+    until(heard)
     assert "trying again" in said[0][1]
     assert "internal error" not in said[0][1]
     assert closed_in(source) < CLOSED_WITHIN_S

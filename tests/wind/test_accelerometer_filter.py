@@ -90,7 +90,7 @@ class Truth:
             true = rotation.T @ np.array((0.0, 0.0, GRAVITY))
         else:
             true = MODEL.specific_force(rotation.T @ (self.state[WIND] - self.state[VELOCITY]), thrust)
-        return true + self.state[BIAS] + self.noise.accelerometer_m_s2 * self.rng.standard_normal(3)
+        return np.asarray(true + self.state[BIAS] + self.noise.accelerometer_m_s2 * self.rng.standard_normal(3))
 
 
 def _exp(vector: Array) -> Array:

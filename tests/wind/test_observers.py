@@ -118,11 +118,12 @@ def test_noise_on_velocity_costs_as_much_as_the_cut_off_is_high() -> None:
     states[:, :3] = 0.02 * rng.standard_normal((3000, 3))
     noises = {}
     acceleration = AccelerationEstimator(BODY, CUTOFF)
-    for name, update in {
+    updates: dict[str, Callable[[float, Array, Array], Array]] = {
         "DP1": FuzzyDisturbanceObserver(BODY, DP1).update,
         "DP2": FuzzyDisturbanceObserver(BODY, DP2).update,
         "acceleration": lambda t, x, u: acceleration.update(t, x, u, np.zeros(3)),
-    }.items():
+    }
+    for name, update in updates.items():
         found = [update(number * PERIOD_S, state, np.zeros(6)) for number, state in enumerate(states)]
         noises[name] = float(np.sqrt(np.mean(np.array(found)[100:, :3] ** 2)))
     assert noises["DP1"] == pytest.approx(BODY.mass_kg * CUTOFF * 0.02, rel=0.1)

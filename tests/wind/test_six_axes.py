@@ -12,6 +12,9 @@ from uasfly.frames import quaternion_from_euler
 from uasfly.wind.fuzzy import CORNERS, RATE_BOUND_RAD_S, blend, memberships, rule_matrices
 from uasfly.wind.six_axes import TORQUES, SixAxisBody
 
+Axes = tuple[float, float, float]
+Figures = tuple[float, Axes] | tuple[float, Axes, float]
+
 
 def test_the_model_is_newton_and_euler() -> None:
     """A(p, q, r) x + B u is what the equations of motion say, at any rates and inputs."""
@@ -59,7 +62,7 @@ def test_virtual_inputs_of_a_hover_and_of_a_tilted_vehicle() -> None:
         ((1.0, (1.0, 1.0, 1.0), -1.0), "damping"),
     ],
 )
-def test_impossible_bodies_are_refused(body: tuple, name: str) -> None:
+def test_impossible_bodies_are_refused(body: Figures, name: str) -> None:
     """The message names the figure."""
     with pytest.raises(UasflyError, match=name):
         SixAxisBody(*body)

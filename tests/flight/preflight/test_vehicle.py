@@ -26,7 +26,8 @@ from uasfly.preflight_messages import Verdict
 @pytest.mark.parametrize("flag", ["attitude", "velocity", "position"])
 def test_a_vehicle_that_is_not_healthy_is_not_flown(flag: str) -> None:
     """The line names what is missing; silence is a warning."""
-    line = check("health", view=view(**{f"{flag}_ok": False}))
+    changes: dict[str, Any] = {f"{flag}_ok": False}
+    line = check("health", view=view(**changes))
     assert (line.verdict, line.value) == (STOP, f"no valid {flag}")
     assert verdict("health") is OK
     assert check("health", view=VehicleView()).value == "not told"
