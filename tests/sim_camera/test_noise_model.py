@@ -15,7 +15,7 @@ from uasfly.sim.camera.renderer import Renderer
 from uasfly.sim.camera.settings import Background, Noise
 from uasfly.sim.camera.shutter import Arrivals, Exposure, Shutter
 from uasfly.vision.bundle_pose import solve_bundle
-from uasfly.vision.detectors import make_detector
+from uasfly.vision.detector_choice import make_detector
 from uasfly.vision.mounting import marker_sample
 from uasfly.vision.pose import Pose
 from uasfly.vision.seek import detect_markers

@@ -10,7 +10,8 @@ from tests.data import test_data
 from uasfly.bundle import Bundle
 from uasfly.camera import Camera
 from uasfly.vision.bundle_pose import solve_bundle
-from uasfly.vision.detectors import Image, make_detector
+from uasfly.vision.detector_choice import make_detector
+from uasfly.vision.detectors import Image
 from uasfly.vision.opencv_detector import OpenCvDetector
 from uasfly.vision.pose import Pose
 from uasfly.vision.seek import detect_markers

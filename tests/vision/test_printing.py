@@ -16,7 +16,8 @@ from tests.vision.test_pose import bundle
 from uasfly.bundle import Bundle
 from uasfly.cli.main import app
 from uasfly.errors import FileError, UasflyError
-from uasfly.vision.detectors import Image, make_detector
+from uasfly.vision.detector_choice import make_detector
+from uasfly.vision.detectors import Image
 from uasfly.vision.printing import draw_page
 from uasfly.vision.seek import detect_markers
 from uasfly.vision.sheets import PAPERS_MM, Page, bundle_sheet, marker_sheets, pages_of

@@ -17,7 +17,8 @@ from uasfly.errors import FileError, UasflyError
 from uasfly.marker_prediction import MarkerPrediction
 from uasfly.messages import Array
 from uasfly.vision.bundle_pose import solve_bundle
-from uasfly.vision.detectors import Detector, make_detector
+from uasfly.vision.detector_choice import make_detector
+from uasfly.vision.detectors import Detector
 from uasfly.vision.edges import fit_edges
 from uasfly.vision.mounting import camera_in_body
 from uasfly.vision.opencv_detector import OpenCvDetector

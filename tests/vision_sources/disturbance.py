@@ -23,7 +23,7 @@ from uasfly.camera import Camera
 from uasfly.sim.camera.renderer import Renderer
 from uasfly.sim.camera.settings import Background, Noise
 from uasfly.vision.bundle_pose import solve_bundle
-from uasfly.vision.detectors import make_detector
+from uasfly.vision.detector_choice import make_detector
 from uasfly.vision.frames import Announcement, Frame
 from uasfly.vision.seek import detect_markers
 from uasfly.vision.worker import DetectionWorker

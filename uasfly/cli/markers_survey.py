@@ -47,7 +47,7 @@ def survey(
     from uasfly.vision.bundle_survey.bundle_file import bundle_text, write_bundle
     from uasfly.vision.bundle_survey.survey import survey_bundle
     from uasfly.vision.bundle_survey.views import look, spread
-    from uasfly.vision.detectors import Library, make_detector
+    from uasfly.vision.detector_choice import Library, make_detector
 
     check_writable(out, "bundle file")
     if family not in get_args(Family):

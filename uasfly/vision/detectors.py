@@ -1,4 +1,4 @@
-"""What every marker detector gives, and which one reads which family of markers.
+"""What every marker detector gives.
 
 Corners are in OpenCV's convention whatever library found them: the centre of the top-left pixel is (0, 0); the order is
 top-left, top-right, bottom-right, bottom-left of the upright marker seen from the front.
@@ -7,17 +7,15 @@ top-left, top-right, bottom-right, bottom-left of the upright marker seen from t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uasfly.bundle import Family
 from uasfly.errors import UasflyError
 from uasfly.messages import Array
 
 Image = NDArray[np.uint8]
-Library = Literal["auto", "opencv", "apriltag", "stag"]
 
 # Cells along the side of a marker, its black border included.
 _CELLS = {
@@ -75,30 +73,6 @@ class Detector(Protocol):
 def border_of(family: str) -> float:
     """Width of the narrowest part of the black border as a fraction of the marker's side."""
     return next(1.0 / cells for name, cells in _CELLS.items() if family.startswith(name))
-
-
-def make_detector(family: Family, library: Library = "auto") -> Detector:
-    """Detector of a family; `auto` takes OpenCV where it knows the family.
-
-    Raises:
-        UasflyError: the library does not know the family, or is not installed.
-    """
-    stag = family.startswith("stag_")
-    chosen = ("stag" if stag else "opencv") if library == "auto" else library
-    if stag != (chosen == "stag"):
-        needed = "stag" if stag else "opencv or apriltag"
-        raise UasflyError(f"markers {family}: expected the library {needed}, found {chosen}")
-    if chosen == "stag":
-        from uasfly.vision.stag_detector import StagDetector
-
-        return StagDetector(family)
-    if chosen == "apriltag":
-        from uasfly.vision.apriltag_detector import AprilTagDetector
-
-        return AprilTagDetector(family)
-    from uasfly.vision.opencv_detector import OpenCvDetector
-
-    return OpenCvDetector.of_family(family)
 
 
 def grey_picture(image: Image) -> Image:

@@ -14,7 +14,8 @@ from uasfly.errors import FileError, UasflyError
 from uasfly.file_problems import did_you_mean
 from uasfly.files import find_file, load_file
 from uasfly.vision.bundle_pose import BundleSight, solve_bundle
-from uasfly.vision.detectors import Detection, Detector, Image, Library, make_detector
+from uasfly.vision.detector_choice import Library, make_detector
+from uasfly.vision.detectors import Detection, Detector, Image
 from uasfly.vision.mounting import marker_sample
 from uasfly.vision.pictures import pictures
 from uasfly.vision.seek import detect_markers

@@ -9,7 +9,8 @@ from uasfly.camera import Camera
 from uasfly.marker_prediction import MarkerPrediction
 from uasfly.messages import MarkerSample
 from uasfly.vision.bundle_pose import BundleSight, solve_bundle
-from uasfly.vision.detectors import Detection, Detector, Image, Region, make_detector
+from uasfly.vision.detector_choice import make_detector
+from uasfly.vision.detectors import Detection, Detector, Image, Region
 from uasfly.vision.mounting import marker_sample, pose_in_camera
 from uasfly.vision.region import RegionPlan
 from uasfly.vision.seek import detect_markers
