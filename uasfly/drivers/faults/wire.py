@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import development as dialect
 
+from uasfly.drivers.faults.vehicle_clock import VehicleClock
 from uasfly.frames import euler_from_quaternion, swap_quaternion_enu_ned
 from uasfly.link.modes import flight_mode
 from uasfly.link.truth import simulated_truth
@@ -24,7 +25,6 @@ from uasfly.sim.mavlink.framing import FrameReader
 
 MICRO, MILLI = 1e-6, 1e-3
 AUTOPILOT = 1
-CLOCK_STEP_S = 0.5  # the vehicle's clock has been moved by more than this: it was restarted or jumped
 BUFFER_BYTES = 65536
 LISTENER = (245, 191)  # system and component of the one who asks for the truth
 TRUTH_ID, TRUTH_INTERVAL_US, ASK_EVERY_S = 350, 20000, 1.0
@@ -54,7 +54,7 @@ class Wire(threading.Thread):
         self.modes: list[tuple[float, FlightMode]] = []
         self.texts: list[tuple[float, str]] = []
         self.offboard_s = math.nan
-        self._offset_s = math.nan  # host time minus vehicle time
+        self._clock = VehicleClock()
         self._vehicle: Any = None
         self._ended = threading.Event()
         self._down, self._up = FrameReader(), FrameReader()
@@ -113,11 +113,7 @@ class Wire(threading.Thread):
     def _from_vehicle(self, now: float, message: Any) -> None:
         match message.get_type():
             case "DEBUG_FLOAT_ARRAY":
-                vehicle_s = message.time_usec * MICRO
-                offset = now - vehicle_s
-                if not abs(offset - self._offset_s) < CLOCK_STEP_S:
-                    self._offset_s = offset
-                self._offset_s = min(self._offset_s + 1e-5, offset)  # the least delay, forgotten slowly
+                self._clock.hear(now, message.time_usec * MICRO)
                 truth = simulated_truth({"name": message.name, "data": list(message.data)}, now)
                 if truth is not None:
                     self.truths.append(truth)
@@ -136,7 +132,7 @@ class Wire(threading.Thread):
             case "SET_ATTITUDE_TARGET":
                 quaternion = swap_quaternion_enu_ned(np.array(message.q, dtype=np.float64))
                 roll, pitch, yaw = euler_from_quaternion(quaternion)
-                made_s = message.time_boot_ms * MILLI + self._offset_s
+                made_s = message.time_boot_ms * MILLI + self._clock.offset_s
                 setpoint = Setpoint(made_s, roll, pitch, yaw, -message.body_yaw_rate, message.thrust)
                 self.setpoints.append((now, now - made_s, setpoint))
             case "STATUSTEXT":
