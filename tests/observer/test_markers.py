@@ -11,7 +11,8 @@ from uasfly.observer import functions
 from uasfly.observer import states as s
 from uasfly.observer.door import Sighting
 from uasfly.observer.markers import MarkerAlgebra
-from uasfly.observer.sighting_gate import SCALE_MAX
+from uasfly.observer.sighting_gate import SCALE_MAX, SCALE_MIN
+from uasfly.observer.update import GATE_6
 
 COVARIANCE = np.diag((0.01**2,) * 3 + (0.02**2,) * 3)
 
@@ -118,3 +119,35 @@ def test_a_sighting_outside_its_gate_is_refused_and_let_in_as_it_repeats() -> No
         result = algebra.sighting(packed, 1, 0, sighting, scale, 0.1)
     assert 20 < refused < 80
     assert scale < SCALE_MAX
+
+
+@pytest.mark.parametrize("scale", [0.02, 0.7, 30.0])
+@pytest.mark.parametrize("away_m", [0.01, 2.0])
+def test_the_scale_is_matched_as_the_covariances_of_the_other_sensors_are(scale: float, away_m: float) -> None:
+    """Eq. 8, 9 in the weighted form, written out: one number, shortened to the gate, R within its bounds."""
+    rng = np.random.default_rng(6)
+    layout, packed = s.Layout(1), packed_state(1, rng)
+    core, marker = packed[: s.CORE_NOMINAL], packed[s.marker_nominal(0)]
+    view = seen_from(core, marker)
+    sighting = Sighting(0.0, 7, plus_pose(view, np.array((away_m, 0.0, 0.01, 0.0, 0.02, 0.0))), COVARIANCE)
+    result = algebra_of(1).sighting(packed, 1, 0, sighting, scale, 0.1)
+    H = np.zeros((6, layout.errors))
+    for k in range(layout.errors):
+        steps = [sign * 1e-6 * np.eye(layout.errors)[k] for sign in (1, -1)]
+        views = [
+            seen_from(
+                plus_core(packed[: s.CORE_NOMINAL], d[: s.CORE_ERROR]), plus_pose(packed[s.marker_nominal(0)], d[21:])
+            )
+            for d in steps
+        ]
+        H[:, k] = (minus_pose(view, views[0]) - minus_pose(view, views[1])) / 2e-6
+    R = max(scale, SCALE_MIN) * COVARIANCE
+    S = H @ covariance_of(packed, layout) @ H.T + R
+    innovation = result.innovation
+    nis = float(innovation @ np.linalg.solve(S, innovation))
+    after = R @ np.linalg.solve(S, innovation) * min(1.0, GATE_6 / nis) ** 0.5
+    sample = np.outer(after, after) + R - R @ np.linalg.solve(S, R)
+    matched = np.trace(np.linalg.solve(COVARIANCE, sample)) / 6.0
+    assert result.nis == pytest.approx(nis, rel=1e-5)
+    assert result.accepted == (nis < GATE_6)
+    assert result.scale == pytest.approx(scale + 0.1 * (matched - scale), rel=1e-5)

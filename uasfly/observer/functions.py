@@ -1,4 +1,4 @@
-"""The generated functions of the filter: prediction, odometry step, extrapolation and marker geometry.
+"""The generated functions of the filter: prediction and extrapolation, its steps, and where a marker is.
 
 Each works on packed vectors (`states.Layout` and the IN_ and OUT_ indices) and is built once a process for each number
 of markers. Algebra of whole covariances is matrix by matrix (CasADi's MX): a handful of loops. Written out number by

@@ -19,8 +19,7 @@ def geometry(core: ca.SX, marker: ca.SX, relative: ca.SX) -> list[ca.SX]:
 
 def noise(inputs: ca.SX) -> list[ca.SX]:
     """R (6, 6): what the sighting states, scaled as matched."""
-    scale = ca.fmin(ca.fmax(inputs[s.IN_SCALE], SCALE_MIN), SCALE_MAX)
-    return [scale * ca.reshape(inputs[s.IN_SIGHTING_COVARIANCE], 6, 6)]
+    return [_bounded(inputs[s.IN_SCALE]) * ca.reshape(inputs[s.IN_SIGHTING_COVARIANCE], 6, 6)]
 
 
 def gate(innovation: ca.SX, total: ca.SX, inputs: ca.SX) -> list[ca.SX]:
@@ -35,7 +34,7 @@ def gate(innovation: ca.SX, total: ca.SX, inputs: ca.SX) -> list[ca.SX]:
         scale).
     """
     scale, weight = inputs[s.IN_SCALE], inputs[s.IN_SIGHTING_WEIGHT]
-    used = ca.fmin(ca.fmax(scale, SCALE_MIN), SCALE_MAX)
+    used = _bounded(scale)
     stated = ca.reshape(inputs[s.IN_SIGHTING_COVARIANCE], 6, 6)
     root = ca.solve(ca.chol(total).T, ca.SX.eye(6))  # S = U' U with U upper triangular, S^-1 = root' root
     inverse = ca.mtimes(root.T, root)
@@ -46,3 +45,7 @@ def gate(innovation: ca.SX, total: ca.SX, inputs: ca.SX) -> list[ca.SX]:
     after = used**2 * shortened * ca.dot(solved, ca.mtimes(stated, solved))
     sample = (after + used * s.MARKER_DOF - used**2 * ca.trace(ca.mtimes(inverse, stated))) / s.MARKER_DOF
     return [accepted * inverse, ca.vertcat(nis, accepted, scale + weight * (sample - scale))]
+
+
+def _bounded(scale: ca.SX) -> ca.SX:
+    return ca.fmin(ca.fmax(scale, SCALE_MIN), SCALE_MAX)
