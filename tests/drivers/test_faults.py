@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from uasfly.cli.main import app
 from uasfly.drivers.faults.case import FaultCase
 from uasfly.drivers.faults.catalogue import CATALOGUE
+from uasfly.drivers.faults.live import without_one_under_way
 from uasfly.drivers.faults.outcome import Outcome, bad_setpoints, judge, sentence
 from uasfly.drivers.faults.story import Story
 from uasfly.drivers.faults.table import fly_table, select_cases
@@ -96,6 +97,24 @@ def test_a_wrong_setpoint_is_found(age_s: float, setpoint: Setpoint, problem: st
     (text,) = bad_setpoints([(age_s, setpoint)], LIMITS)
     assert problem in text
     assert bad_setpoints([(0.1, _setpoint(1.0))], LIMITS) == []
+
+
+def test_of_a_stopped_process_one_setpoint_may_have_been_under_way() -> None:
+    """Only the first after the stop, and only where it was made in the cycle that was stopped: all others count."""
+    stopped_s, for_s = 10.0, 3.0
+    before = [(9.98, 0.002, _setpoint(9.978))]
+    under_way = (13.001, 3.004, _setpoint(9.997))
+    after = [(13.02, 0.002, _setpoint(13.018))]
+    assert without_one_under_way([*before, under_way, *after], stopped_s, for_s) == before + after
+    for wrong in (
+        [*before, (13.001, 1.0, _setpoint(12.0)), *after],  # made when nobody was there to make it
+        [*before, (13.001, 3.1, _setpoint(9.9)), *after],  # made long before
+        [*before, *after, (13.03, 3.033, _setpoint(9.997))],  # not the first
+        [*before, (11.0, 1.003, _setpoint(9.997)), *after],  # leaves while the process stands
+    ):
+        assert without_one_under_way(wrong, stopped_s, for_s) == wrong
+    assert without_one_under_way([*before, under_way, under_way], stopped_s, for_s) == [*before, under_way]
+    assert without_one_under_way(before, stopped_s, for_s) == before
 
 
 def test_an_outcome_is_held_against_everything_expected() -> None:

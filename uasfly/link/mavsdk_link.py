@@ -25,7 +25,7 @@ from uasfly.link.waiting import Waiting
 from uasfly.messages import Array, Request, Sample, Setpoint
 from uasfly.wind_messages import WindEstimate
 
-LONGEST_SETPOINT_AGE_S = 0.2
+LONGEST_SETPOINT_AGE_S = 0.15  # on the wire it is younger than 0.2 s, whatever MAVSDK and the system take
 EVENTS_MIN_BAUD = 230400  # the texts of PX4's events are some 100 kB to fetch, once
 
 
