@@ -128,6 +128,16 @@ class TrackingMonitor(Monitor):
     error_m: Positive = 1.0
 
 
+class ContactMonitor(Monitor):
+    """Something carries the vehicle on its way: the ground or a structure, where the height or the place is wrong.
+
+    Flying on there would tip it over; PX4's landing finds the ground and disarms.
+    """
+
+    action: ActionName = "land"
+    after_s: Annotated[Seconds, Field(description="since the thrust fell below half of the weight, at rest")] = 0.3
+
+
 class TiltMonitor(Monitor):
     """The vehicle tilts far beyond what it is ever asked to."""
 
@@ -180,6 +190,7 @@ class MonitorSettings(FileModel):
     geofence: FenceMonitor = FenceMonitor()
     altitude: FenceMonitor = FenceMonitor()
     tracking: TrackingMonitor = TrackingMonitor()
+    contact: ContactMonitor = ContactMonitor()
     tilt: TiltMonitor = TiltMonitor()
     battery: BatteryMonitor = BatteryMonitor()
     wind: WindMonitor = WindMonitor()

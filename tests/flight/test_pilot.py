@@ -57,6 +57,7 @@ def _mission(**changes: Any) -> Mission:
 class FakeObserver:
     """Knows exactly where the scripted vehicle is, and remembers what it was told; no rotor tells its speed."""
 
+    carried = False
     rotor_ratio: float | None = None
     rotor_excess_m_s2 = 0.0
 

@@ -127,6 +127,7 @@ class Supervisor:
                 marker=None if guide is None else guide.marker,
                 by_marker=guide is not None and course.begun,
                 wind=wind,
+                carried=self._observer.carried,
             )
         )
 

@@ -111,6 +111,11 @@ class Observer:
         self._drive.rescale(commands, rotors)
 
     @property
+    def carried(self) -> bool:
+        """Whether something else than the air carries the vehicle, although PX4 calls it in the air."""
+        return self._drive.in_air and not self._drive.flies
+
+    @property
     def rotor_ratio(self) -> float | None:
         """Thrust by rotor speeds over thrust by commands, over seconds; None where the filter flies by commands."""
         moment = self.moment

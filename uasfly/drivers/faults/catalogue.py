@@ -228,6 +228,15 @@ WIND = (
         scenario="calm",
     ),
     FaultCase(
+        "sinks",
+        "GNSS drifts upwards with 0.3 m/s: it sinks to the ground",
+        ("back off", "land", *LANDS),
+        1.6,
+        7.0,
+        _fault("gnss_drift", velocity_m_s=[0, 0, 0.3]),
+        scenario="calm",
+    ),
+    FaultCase(
         "tracking",
         "a gust of 16 m/s for 1.5 s pushes it away",
         ("hold", "flies on", *COMPLETES),

@@ -10,7 +10,7 @@ from uasfly.flight.monitors.battery import BatteryEnds, BatteryLow
 from uasfly.flight.monitors.estimate import UncertainEstimate, not_finite
 from uasfly.flight.monitors.gnss import GnssDegraded, GnssDrift, GnssJump, GnssLost
 from uasfly.flight.monitors.marker import MarkerLost, MarkerMoved
-from uasfly.flight.monitors.motion import FarFromReference, OutsideAltitudes, OutsideFence, Tilted
+from uasfly.flight.monitors.motion import FarFromReference, OutsideAltitudes, OutsideFence, Tilted, carried
 from uasfly.flight.monitors.solver import Fallbacks
 from uasfly.flight.monitors.watch import Watch
 from uasfly.flight.monitors.watched import Watched
@@ -48,6 +48,7 @@ class Monitors:
             Watch("geofence", s.geofence, OutsideFence(limits, s.geofence)),
             Watch("altitude", s.altitude, OutsideAltitudes(limits, s.altitude)),
             Watch("tracking", s.tracking, FarFromReference(s.tracking)),
+            Watch("contact", s.contact, carried),
             Watch("tilt", s.tilt, Tilted(airframe, s.tilt)),
             Watch("battery", Monitor(action="warn", after_s=1.0), BatteryLow(s.battery), flying_only=False),
             Watch("battery", s.battery, BatteryEnds(s.battery, mission, airframe), flying_only=False),

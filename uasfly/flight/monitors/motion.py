@@ -1,4 +1,4 @@
-"""Is the vehicle where it may be, where it should be, and upright?"""
+"""Is the vehicle where it may be, where it should be, in the air, and upright?"""
 
 from __future__ import annotations
 
@@ -57,6 +57,14 @@ class FarFromReference:
             return ""
         error = math.dist(watched.estimate.position_in_world.tolist(), watched.reference.tolist())
         return "" if error <= self._error_m else f"{error:.1f} m away from where it should be"
+
+
+def carried(watched: Watched) -> str:
+    """Where the vehicle believes to be while something carries it."""
+    if not watched.carried:
+        return ""
+    height_m = float(watched.estimate.position_in_world[2] - watched.origin[2])
+    return f"it stands on something, {height_m:.1f} m high by the estimate"
 
 
 class Tilted:

@@ -27,6 +27,7 @@ class Watched:
         marker: that the mission hangs on, None where the filter does not know it.
         by_marker: the mission hangs on a marker, and has begun.
         wind: None where it is not known.
+        carried: something else than the air carries the vehicle.
     """
 
     time_s: float
@@ -41,3 +42,4 @@ class Watched:
     marker: MarkerEstimate | None = None
     by_marker: bool = False
     wind: WindEstimate | None = None
+    carried: bool = False
