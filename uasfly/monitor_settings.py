@@ -135,7 +135,7 @@ class ContactMonitor(Monitor):
     """
 
     action: ActionName = "land"
-    after_s: Annotated[Seconds, Field(description="since the thrust fell below half of the weight, at rest")] = 0.3
+    after_s: Annotated[Seconds, Field(description="beyond 0.15 s at rest with less thrust than half its weight")] = 0.0
 
 
 class TiltMonitor(Monitor):

@@ -89,3 +89,28 @@ def test_when_px4_takes_over_its_own_thrust_counts_at_once() -> None:
     estimate = estimated(observer, 1.29)
     assert estimate.velocity_in_world[2] == pytest.approx(-0.52, abs=0.03)
     assert np.abs(estimate.force_in_world).max() < 0.1
+
+
+def test_a_vehicle_that_hops_off_the_ground_still_counts_as_carried_for_a_look() -> None:
+    """With thrust again it is told for 0.2 s more, so that a look ten times a second sees it, and not for longer."""
+    observer, carried = Observer(f550()), []
+    observer.add(in_air(-1.0))
+    for k in range(120):
+        observer.sent(setpoint(0.01 * k, 0.3 * HOVER if 30 <= k < 60 else HOVER), in_offboard=True)
+        observer.add(odometry(0.01 * k))
+        carried.append(observer.carried)
+    assert not any(carried[:45])
+    assert all(carried[55:75])
+    assert not any(carried[90:])
+
+
+def test_on_the_ground_nothing_counts_as_carried() -> None:
+    """That it stands there is no news where PX4 says so itself."""
+    observer = Observer(f550())
+    observer.add(in_air(-1.0))
+    for k in range(60):
+        observer.sent(setpoint(0.01 * k, 0.3 * HOVER), in_offboard=True)
+        observer.add(odometry(0.01 * k))
+    assert observer.carried
+    observer.add(VehicleSample(0.6, FlightMode.OFFBOARD, armed=False, in_air=False))
+    assert not observer.carried

@@ -112,8 +112,8 @@ class Observer:
 
     @property
     def carried(self) -> bool:
-        """Whether something else than the air carries the vehicle, although PX4 calls it in the air."""
-        return self._drive.in_air and not self._drive.flies
+        """Whether something else than the air has just carried the vehicle, although PX4 calls it in the air."""
+        return self._drive.carried
 
     @property
     def rotor_ratio(self) -> float | None:
