@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -114,6 +115,17 @@ async def test_a_setpoint_arrives_once_and_complete(pair: Pair) -> None:
     assert target.time_boot_ms == pytest.approx(vehicle.time_s * 1e3, abs=2000.0)
     assert sum(value * value for value in target.q) == pytest.approx(1.0, abs=1e-5)
     assert target.q[0] != 1.0
+
+
+async def test_an_old_setpoint_stays_here(pair: Pair) -> None:
+    """Made 0.16 s ago it is not sent, but counted; one that was made now is."""
+    link, vehicle = pair
+    assert not link.send(replace(LEVEL, time_s=time.monotonic() - 0.16))
+    assert link.losses()["stale setpoints"] == 1
+    assert link.send(replace(LEVEL, time_s=time.monotonic()))
+    await arrived(lambda: bool(vehicle.of_type("SET_ATTITUDE_TARGET")))
+    await asyncio.sleep(0.3)
+    assert len(vehicle.of_type("SET_ATTITUDE_TARGET")) == 1
 
 
 async def test_a_reader_that_comes_late_gets_the_newest_samples(pair: Pair) -> None:

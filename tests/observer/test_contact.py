@@ -34,6 +34,16 @@ def test_without_thrust_and_without_falling_it_stands() -> None:
     assert not any(stood([0.0] * 100, 0.7 * GRAVITY_M_S2))
 
 
+def test_a_clock_that_was_set_back_makes_no_contact() -> None:
+    """It stood at 1 s; in the air at 0.5 s, on a new clock, that is not lately."""
+    contact = GroundContact()
+    for k in range(100):
+        contact.look(0.01 * k, 0.0, 2.0)
+    assert contact.stood_lately
+    contact.look(0.5, 0.0, GRAVITY_M_S2)
+    assert not contact.stood_lately
+
+
 @pytest.mark.parametrize("share", [0.0, 0.25, 0.49])
 def test_a_vehicle_that_is_thrown_up_is_not_taken_for_standing(share: float) -> None:
     """It passes through rest at the top, with whatever thrust."""

@@ -16,7 +16,6 @@ from uasfly.observer.thrust import ThrustHistory
 OWN_COMMAND_S = 0.5  # for this long after a command of ours in offboard, PX4's attitude target is only its echo
 THRUST_SHOWS_S = 0.05  # in the velocity, over so long: for what carries the vehicle
 FORCE_SHOWS_S = 0.5  # the force is what thrust left over in about so long
-CARRIED_FOR_S = 0.2  # longer than the monitors look away
 ROTORS_WITHIN_S = 0.5  # of where the filter stands: speeds further away have a wrong time
 
 
@@ -40,7 +39,6 @@ class Drive:
         self.thrust: ThrustHistory | RotorThrust = self._rotors if self._turns else self._commands
         self._k_thrust_m_s2 = airframe.model.k_thrust_m_s2
         self._contact = GroundContact()
-        self._looked_s = self._carried_s = -math.inf
         self.in_air = False
         self._in_air_s = -math.inf
         self._own_command_s = -math.inf
@@ -52,8 +50,8 @@ class Drive:
 
     @property
     def carried(self) -> bool:
-        """Whether something has just carried the vehicle although PX4 calls it in the air; it may hop meanwhile."""
-        return self.in_air and self._looked_s - self._carried_s < CARRIED_FOR_S
+        """Whether something carries the vehicle, or has just done so, although PX4 calls it in the air."""
+        return self.in_air and self._contact.stood_lately
 
     def hear(self, vehicle: VehicleSample) -> None:
         """Whether it is in the air and who flies it."""
@@ -94,9 +92,6 @@ class Drive:
             if thrust_m_s2 <= LIGHT_M_S2:
                 thrust_m_s2 = self._commands.mean(odometry.time_s - THRUST_SHOWS_S, odometry.time_s)
             self._contact.look(odometry.time_s, odometry.velocity[2], thrust_m_s2)
-            self._looked_s = odometry.time_s
-            if self._contact.stands:
-                self._carried_s = odometry.time_s
 
     def missing_thrust(self, filter_s: float, commands: float, rotors: float) -> float:
         """By how much more [m/s^2] pushed than was reckoned with, where commands and rotors gave so many times that."""
